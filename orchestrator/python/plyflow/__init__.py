@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
-    "Artifact", "Body", "Cancelled", "Damaged", "Event", "FieldInfo", "Finding", "InvalidInput", "Law", "Locked", "Material", "MissingPackage", "NotFound", "Number",
-    "PlyflowError", "Refused", "Run", "RunFailed", "Scene", "Step", "StepRun", "Stopped", "Store", "Study", "Values", "Workflow", "__version__",
-    "declare", "diaphragm", "include_folder", "law", "material", "open", "ply", "program", "run", "schema", "step", "templates_folder",
-    "workflows_folder",
+    "Artifact", "Body", "Cancelled", "Damaged", "Event", "FieldInfo", "Finding", "InvalidInput", "Law", "Locked", "Material", "MissingPackage",
+    "NotFound", "Number", "PlyflowError", "Refused", "Run", "RunFailed", "Scene", "Step", "StepRun", "Stopped", "Store", "Study", "Values",
+    "Workflow", "__version__", "declare", "diaphragm", "include_folder", "law", "material", "open", "ply", "program", "run", "schema", "step",
+    "templates_folder", "workflows_folder",
 ]  # fmt: skip
 
 # In which module each name is. It is imported when the name is used: the command `plyflow` must not wait for numpy.

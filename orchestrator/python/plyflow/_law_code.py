@@ -52,9 +52,12 @@ def _made() -> dict[str, str]:
 
 
 def _watch(source: str) -> list[str]:
-    """The file, and the modules beside and below it that it has imported."""
+    """The file, the modules beside and below it that it has imported, and what tells the version of numba and of LLVM."""
+    from importlib import metadata
+
     folder = Path(source).parent
-    found = {source}
+    places = [getattr(metadata.distribution(name), "_path", None) for name in ("numba", "llvmlite")]
+    found = {source, *(str(place) for place in places if place)}
     for module in list(sys.modules.values()):
         file = getattr(module, "__file__", None)
         if not file:
@@ -164,7 +167,18 @@ def _finding(error: Exception, function: Any, source: str) -> Finding:
         if missing:
             line = rules.line_of_name(function, missing[1] or missing[2])
     said = [part.strip() for part in text.splitlines()]
-    boring = ("", "Failed in nopython mode pipeline", "During:", "- During", "There are", "- Of which", "Overload", "With argument", "Rejected", "File ")
+    boring = (
+        "",
+        "Failed in nopython mode pipeline",
+        "During:",
+        "- During",
+        "There are",
+        "- Of which",
+        "Overload",
+        "With argument",
+        "Rejected",
+        "File ",
+    )
     useful = [part for part in said if not any(part == b or (b and part.startswith(b)) for b in boring)]
     message = f"numba cannot compile {function.__name__}: {useful[0] if useful else type(error).__name__}"
     return Finding(file, line, 1, "error", message, None, rules.WHAT_A_LAW_MAY, rules.hint_for(text))

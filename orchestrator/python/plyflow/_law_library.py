@@ -39,10 +39,14 @@ sys.stdout.buffer.write(ctypes.string_at(fault.data, fault.length))
 
 
 def make(law: Law, source: Path, library: Path, levels: Sequence[str] = LEVELS) -> dict[str, Any]:
-    """Compiles a law and writes its library; see :func:`plyflow.laws._make`."""
+    """Compiles a law and writes its library.
+
+    Returns:
+        ``library``: its path; ``watch``: the files and folders whose change means to make it anew.
+    """
     if util.find_spec("numba") is None:
         raise MissingPackage("a law in Python needs the package numba, which is not installed: pip install numba")
-    bare = shell("python_law").read_bytes()
+    bare = shell("python_law")
     with tempfile.TemporaryDirectory() as scratch:
         told = _compiled(law, source, levels, Path(scratch))
         code = bytearray()
@@ -64,8 +68,8 @@ def make(law: Law, source: Path, library: Path, levels: Sequence[str] = LEVELS) 
     }
     text = json.dumps(header, allow_nan=False).encode()
     payload = len(text).to_bytes(8, "little") + text + bytes(code)
-    _write(library, bare + payload + len(payload).to_bytes(8, "little") + MAGIC, source)
-    return {"library": str(library.absolute()), "manifest": law.manifest, "watch": first["watch"]}
+    _write(library, bare.read_bytes() + payload + len(payload).to_bytes(8, "little") + MAGIC, source)
+    return {"library": str(library.absolute()), "watch": sorted({*first["watch"], str(bare)})}
 
 
 def _write(library: Path, content: bytes, source: Path) -> None:
@@ -128,7 +132,9 @@ def _compiled(law: Law, source: Path, levels: Sequence[str], scratch: Path) -> d
             answer = scratch / level / "answer.json"
             if process.returncode != 0 or not answer.is_file():
                 text = said.decode("utf-8", "replace").strip()
-                raise PlyflowError(f"numba could not compile the law '{law.name}' of {source} for {level} (code {process.returncode}): {text[-2000:]}")
+                raise PlyflowError(
+                    f"numba could not compile the law '{law.name}' of {source} for {level} (code {process.returncode}): {text[-2000:]}"
+                )
             told[level] = json.loads(answer.read_text())
             if told[level]["findings"]:
                 raise InvalidInput([Finding(**finding) for finding in told[level]["findings"]])

@@ -13,7 +13,7 @@ from .laws import Law
 
 WHAT_A_LAW_MAY = "numbers, tuples, if, for, while, the functions of math, and functions of your own that keep to the same"
 
-_NO_RAISE = "return math.nan for a state that must not be: check-plugin and the solver name the place where a number is not finite"
+_NO_RAISE = "return math.nan for a state that must not be: check-plugin finds it, and a run stops there"
 _NO_ARRAY = "use numbers and tuples; what a point remembers is in history"
 _REFUSED: dict[type, tuple[str, str]] = {
     ast.Raise: ("a law cannot raise", _NO_RAISE),
@@ -33,7 +33,9 @@ _REFUSED: dict[type, tuple[str, str]] = {
     ast.Set: ("a law makes no sets: nothing is allocated for a point", "use a tuple, or names"),
 }
 # What of numpy makes an array, by its last name.
-_ARRAYS = frozenset("zeros ones empty full array asarray zeros_like ones_like empty_like linspace arange eye identity dot matmul stack append".split())
+_ARRAYS = frozenset(
+    "zeros ones empty full array asarray zeros_like ones_like empty_like linspace arange eye identity dot matmul stack append".split()
+)
 _CALLED = {
     "print": ("a law cannot print: it runs millions of times, in many threads", "call the law in plain Python to look at its numbers"),
     "open": ("a law reads no files", "read them at the head of the file, or make parameters of what they say"),
@@ -152,7 +154,7 @@ def hint_for(text: str) -> str:
     if "is not defined" in text:
         return "define it in the file, or declare it as a parameter and write p. before it"
     if "Untyped global name" in text or "Cannot determine Numba type" in text:
-        return "a global name must be a number, a tuple of numbers, or a function; call functions of a module of your own by their name (from module import name)"
+        return "a global name must be a number, a tuple of numbers or a function; take functions out of a module by name (from module import name)"
     if "Unknown attribute" in text:
         return "p has the declared parameters, thickness and areal_mass"
     if "unify" in text:

@@ -20,7 +20,7 @@ _MARGIN = 1.01
 
 
 def source_of(law: Law, kind: str, around: dict[str, Any], history: int) -> str:
-    """The text of the function :data:`ENTRY` for one function of a law. 
+    """The text of the function :data:`ENTRY` for one function of a law.
     `around` has the compiled functions of the law, as ``law_membrane`` and so on, and gets the other names that the text uses.
     """
     import math
@@ -125,9 +125,9 @@ def _measured(law: Law, kind: str, history: int) -> str:
 def _bounds() -> list[str]:
     """Bounds of the tangents of the membrane law.
 
-    To either side on its own, as a state may lie where something slips or fails. Of both slopes the matrix takes the larger magnitude, entry by entry:
-    its norm is no smaller than that of any combination of sides. Two bounds of that norm are cheap; the smaller one counts. The first is exact for
-    families that do not know of each other, the second is near where they do.
+    To either side on its own, as a state may lie where something slips or fails. Of both slopes the matrix takes the larger magnitude, entry by
+    entry: its norm is no smaller than that of any combination of sides. Two bounds of that norm are cheap; the smaller one counts. The first is
+    exact for families that do not know of each other, the second is near where they do.
     """
     root = 2**0.5
     lines = [

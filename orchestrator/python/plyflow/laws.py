@@ -15,7 +15,8 @@ The function is compiled by numba (``pip install numba``) once, when the library
 >>> round(membrane(p, 1.0, 1.0, math.sin(0.3))[2], 3)          # plain Python, to plot and to fit
 591.04
 
-``python -m plyflow.laws my_fabric.py -o libmy_fabric.so`` makes the library. The page "From an idea to a law in an hour" of the book
+A material file names the law's file by its path: ``plugin: ./my_fabric.py``. The program makes the library when it is first needed.
+``python -m plyflow.laws my_fabric.py -o libmy_fabric.so`` makes one to keep or to give away. The page "From an idea to a law in an hour" of the book
 (`docs/plugins/law-in-python.md`) goes from here to a formed part.
 """
 
@@ -79,7 +80,8 @@ def law(
         name: of the plugin, as a material file names it.
         version: of the law.
         vendor: who made it.
-        parameters: name -> declaration (:mod:`plyflow.declare`): numbers, quantities, integers, booleans, choices, lists of numbers, and objects of these.
+        parameters: name -> declaration (:mod:`plyflow.declare`): numbers, quantities, integers, booleans, choices, lists of numbers, and objects
+            of these.
         history: how many numbers a point remembers.
 
     Raises:
@@ -87,7 +89,12 @@ def law(
     """
 
     def of(function: Function) -> Law:
-        return Law(function, name, version, vendor, dict(parameters or {}), history)
+        from . import steps
+
+        made = Law(function, name, version, vendor, dict(parameters or {}), history)
+        # By this the program finds what a file defines.
+        steps._DEFINED.append(steps.Definition("law", made.manifest, function, more={"law": made}))
+        return made
 
     return of
 
@@ -207,11 +214,6 @@ def _refuse(function: Function, message: str, given: Any = None, expected: str |
 
 
 def _declared(declaration: Any, function: Function, name: str) -> dict[str, Any]:
-    # Whatever `declare` gives is a mapping, or can say its own.
-    for way in ("manifest", "to_manifest", "as_manifest"):
-        said = getattr(declaration, way, None)
-        if said is not None and not isinstance(declaration, Mapping):
-            declaration = said() if callable(said) else said
     if not isinstance(declaration, Mapping):
         _refuse(function, f"parameter '{name}'", declaration, "a declaration", "use plyflow.declare, as in declare.number(default=1.0, doc='..')")
     return dict(declaration)
@@ -223,7 +225,9 @@ def _values(parameters: Mapping[str, Mapping[str, Any]], function: Function, pat
     for name, declaration in parameters.items():
         said = ".".join((*path, name))
         if not name.isidentifier() or keyword.iskeyword(name) or name.startswith("_"):
-            _refuse(function, f"parameter '{said}'", expected="a name of letters, digits and _, as the law writes p." + (name.replace("-", "_") or "name"))
+            _refuse(
+                function, f"parameter '{said}'", expected="a name of letters, digits and _, as the law writes p." + (name.replace("-", "_") or "name")
+            )
         if not path and name in OF_SHEET:
             _refuse(function, f"parameter '{said}'", hint=f"every sheet has it already: p.{name}")
         kind = declaration.get("type")
@@ -333,26 +337,37 @@ def _frames(error: BaseException) -> list[tuple[str, int]]:
     return [(frame.filename, frame.lineno or 0) for frame in traceback.extract_tb(error.__traceback__)]
 
 
-def _make(law: Law, source_path: Union[str, Path], into: Union[str, Path]) -> dict[str, Any]:
-    """Makes the library of a law.
+def _make(definition: Any, source: Path, into: Path) -> dict[str, Any]:
+    """Makes the library of a law for the program, in a folder that is named for its bytes.
 
     Args:
-        law: as it was found in the file.
-        source_path: the file.
-        into: the folder of the library.
+        definition: of :func:`plyflow.law`, as :func:`plyflow.steps.defined` lists it.
+        source: the file.
+        into: the folder for what is made.
 
     Returns:
-        ``library``: its path; ``manifest``; ``watch``: the files whose change means to make it anew.
+        ``library``: its path; ``watch``: the files and folders whose change means to make it anew.
 
     Raises:
         InvalidInput: the law cannot be compiled; with file, line, reason and what to do.
         MissingPackage: numba is not there.
         NotFound: the shell of laws is not there.
     """
+    import tempfile
+    from hashlib import sha256
+
     from ._law_library import make
 
-    stem = "".join(c if c.isalnum() else "_" for c in law.name)
-    return make(law, Path(source_path).resolve(), Path(into) / f"lib{stem}.so")
+    with tempfile.TemporaryDirectory(dir=into) as scratch:
+        told = make(definition.more["law"], source, Path(scratch) / f"{source.stem}.so")
+        made = Path(told["library"])
+        folder = into / sha256(made.read_bytes()).hexdigest()[:24]
+        folder.mkdir(exist_ok=True)
+        library = folder / made.name
+        # A library of these bytes that is there already may be in use, and stays.
+        if not library.is_file() or library.read_bytes() != made.read_bytes():
+            made.replace(library)
+    return {**told, "library": str(library)}
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -366,12 +381,10 @@ def main(words: Sequence[str] | None = None) -> int:
     given = parser.parse_args(words)
     try:
         found = load(given.file, given.law)
-        if given.output is None:
-            library = _make(found, given.file, Path.cwd())["library"]
-        else:
-            from ._law_library import make
+        from ._law_library import make
 
-            library = make(found, Path(given.file).resolve(), Path(given.output))["library"]
+        stem = "".join(c if c.isalnum() else "_" for c in found.name)
+        library = make(found, Path(given.file).resolve(), Path(given.output or f"lib{stem}.so"))["library"]
     except PlyflowError as error:
         print(f"plyflow.laws: {error}", file=sys.stderr)
         return error.code or 1

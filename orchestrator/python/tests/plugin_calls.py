@@ -27,7 +27,15 @@ class _Functions(ctypes.Structure):
 
 
 class _Sizes(ctypes.Structure):
-    _fields_ = [("size", _WIDE), ("membrane", _INT), ("bending", _INT), ("bends", _INT), ("reserved", _INT), ("thickness", _DOUBLE), ("areal_mass", _DOUBLE)]
+    _fields_ = [
+        ("size", _WIDE),
+        ("membrane", _INT),
+        ("bending", _INT),
+        ("bends", _INT),
+        ("reserved", _INT),
+        ("thickness", _DOUBLE),
+        ("areal_mass", _DOUBLE),
+    ]
 
 
 class _Membrane(ctypes.Structure):

@@ -350,9 +350,13 @@ def test_modules_beside_the_law_are_watched_and_compiled(tmp_path: Path) -> None
     written(tmp_path, "def double(x):\n    return 2.0 * x\n", "doubling.py")
     text = LAW.replace("import math\n", "from doubling import double\n").replace("LINE", "x = double(c11)")
     source = written(tmp_path, text)
-    told = laws._make(laws.load(source), source, tmp_path / "made")
-    assert told["watch"] == [str(tmp_path / "doubling.py"), str(source)]
-    assert told["library"] == str(tmp_path / "made" / "libbad.so") and told["manifest"]["name"] == "bad"
+    told = make(laws.load(source), source, tmp_path / "made" / "libbad.so")
+    beside = [path for path in told["watch"] if path.startswith(str(tmp_path))]
+    assert beside == [str(tmp_path / "doubling.py"), str(source)]
+    # A new version of the compiler, or of the shell, makes it anew.
+    names = [Path(path).name for path in told["watch"]]
+    assert {"numba", "llvmlite", "libplyflow_python_law.so"} <= {name.split("-")[0] for name in names}, names
+    assert told["library"] == str(tmp_path / "made" / "libbad.so")
     stress, _, _, _ = Sheet(Path(told["library"]), {"g": 1.0, "thickness": 1.0, "areal_mass": 1.0}).membrane(np.full((3, 8), 1.5))
     assert (stress[0] == 3.0).all()
 
