@@ -27,13 +27,14 @@ def law_in_python():
     turns = np.radians([0.0, 20.0, 0.0, 30.0, 0.0, 40.0, 0.0])
     angles = np.concatenate([np.linspace(a, b, 200, endpoint=False) for a, b in zip(turns, turns[1:])] + [turns[-1:]])
 
-    def stress(friction):
+    def stress(friction, angles):
         sheet, history = membrane.sheet(friction=friction, **constants), [0.0, 0.0, 0.0]
         return [membrane(sheet, 1.0, 1.0, float(np.sin(angle)), history)[2] for angle in angles]
 
     figure, axes = plt.subplots(figsize=(5, 3.2), layout="constrained")
-    axes.plot(np.degrees(angles), stress(0.0), color=style.GREY, linestyle=(0, (4, 2)), label="without friction")
-    axes.plot(np.degrees(angles), stress(20.0), color=style.BLUE, label="friction of 20 N/m")
+    once = np.linspace(0.0, turns.max(), 200)
+    axes.plot(np.degrees(once), stress(0.0, once), color=style.GREY, linestyle=(0, (4, 2)), label="without friction")
+    axes.plot(np.degrees(angles), stress(20.0, angles), color=style.BLUE, label="friction of 20 N/m")
     axes.set(xlabel="shear angle (deg)", ylabel="shear stress S₁₂ (N/m)", xlim=(0, 41))
     axes.legend(loc="upper left")
     return style.save_svg(figure, "law-in-python")

@@ -45,7 +45,7 @@ def make(law: Law, source: Path, library: Path, levels: Sequence[str] = LEVELS) 
         ``library``: its path; ``watch``: the files and folders whose change means to make it anew.
     """
     if util.find_spec("numba") is None:
-        raise MissingPackage("a law in Python needs the package numba, which is not installed: pip install numba")
+        raise MissingPackage(f"a law in Python needs the package numba, which {sys.executable} does not have: {sys.executable} -m pip install numba")
     bare = shell("python_law")
     with tempfile.TemporaryDirectory() as scratch:
         told = _compiled(law, source, levels, Path(scratch))

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Dict, List, NoReturn, Sequence, Tuple
 
 from . import _environment as environment
-from .errors import PlyflowError
+from .errors import InvalidInput, PlyflowError
 
 _PACKAGE = Path(__file__).resolve().parent
 _MAGIC = b"PLYFLOW-PYTHON-1"
@@ -151,6 +151,8 @@ def main() -> NoReturn:
     os.dup2(2, 1)
     try:
         answer = make(given.file.resolve(), given.into, given.bridge)
+    except InvalidInput as error:
+        answer = {"error": "; ".join(map(str, error.findings))}
     except PlyflowError as error:
         answer = {"error": str(error)}
     except OSError as error:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shutil
 import subprocess
+import sys
 import textwrap
 from pathlib import Path
 from typing import Any
@@ -361,19 +363,67 @@ def test_modules_beside_the_law_are_watched_and_compiled(tmp_path: Path) -> None
     assert (stress[0] == 3.0).all()
 
 
-def test_the_template_runs_in_a_workflow_and_meets_its_closed_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = shutil.copytree(plyflow.templates_folder() / "material-python", tmp_path / "my-fabric")
-    library = folder / "libmy_fabric.so"
-    assert laws.main([str(folder / "my_fabric.py"), "-o", str(library)]) == 0
-    assert "plyflow check-plugin" in capsys.readouterr().out
-    code, checks = judged(library, "--material", str(folder / "my-fabric.yaml"))
-    assert code == 0 and set(checks.values()) == {"passed"}, checks
-    words = [str(plyflow.program()), "run", str(folder / "workflow.yaml"), "--check", "--no-report", "--quiet"]
+def blocks(page: Path, language: str) -> list[str]:
+    """The blocks of code of a page of the book."""
+    return re.findall(rf"```{language}\n(.*?)```", page.read_text(encoding="utf-8"), re.S)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder for files that the program makes into libraries, with a cache of its own and this interpreter."""
+    monkeypatch.setenv("PLYFLOW_PYTHON", sys.executable)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def runs_and_meets_its_closed_form(folder: Path) -> None:
+    code, checks = judged(folder / "my_fabric.py", "--material", str(folder / "my-fabric.yaml"))
+    assert code == 0 and len(checks) >= 27 and set(checks.values()) == {"passed"}, checks
+    words = [str(plyflow.program()), "run", str(folder / "workflow.yaml"), "--check", "--no-report"]
     refused = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
-    assert refused.returncode != 0 and "trust" in refused.stderr
-    subprocess.run([*words, "--trust"], stdin=subprocess.DEVNULL, check=True)
-    run = plyflow.open(folder / "workflow.yaml")
-    assert isinstance(run, plyflow.Run)
+    assert refused.returncode != 0 and "plyflow trust" in refused.stderr
+    done = subprocess.run([*words, "--trust"], stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and "1 run, 0 cached" in done.stdout, done
+
+
+def test_the_template_runs_in_a_workflow_and_meets_its_closed_form(folder: Path) -> None:
+    place = Path(shutil.copytree(plyflow.templates_folder() / "material-python", folder / "my-fabric"))
+    runs_and_meets_its_closed_form(place)
+    # The library is that of the code, not of the words around it.
+    source = place / "my_fabric.py"
+    source.write_text("# A comment.\n" + source.read_text())
+    words = [str(plyflow.program()), "run", str(place / "workflow.yaml"), "--check", "--no-report", "--trust"]
+    again = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=True)
+    assert "0 run, 1 cached" in again.stdout
+    source.write_text(source.read_text().replace('default="400 N/m"', 'default="500 N/m"'))
+    again = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    assert again.returncode == 5 and "1 run, 0 cached" in again.stdout, again
+
+
+def test_the_law_of_the_page_runs_and_its_bounds_hold(folder: Path) -> None:
+    page = Path(__file__).parents[3] / "docs" / "plugins" / "law-in-python.md"
+    law, shown, bounds = blocks(page, "python")
+    material, workflow = blocks(page, "yaml")
+    for name, text in (("my_fabric.py", law), ("my-fabric.yaml", material), ("workflow.yaml", workflow)):
+        (folder / name).write_text(text)
+    runs_and_meets_its_closed_form(folder)
+    (folder / "my_fabric.py").write_text(law + bounds)
+    runs_again = judged(folder / "my_fabric.py", "--material", str(folder / "my-fabric.yaml"))
+    assert runs_again[0] == 0 and set(runs_again[1].values()) == {"passed"}, runs_again
+    printed = subprocess.run([sys.executable, "-c", shown], capture_output=True, text=True, check=True, cwd=folder).stdout.splitlines()
+    assert len(printed) == 81 and float(printed[40].split()[1]) > float(printed[0].split()[1]) == 0.0 > float(printed[-1].split()[1])
+
+
+def test_what_is_wrong_with_a_law_is_shown_where_a_material_names_it(folder: Path) -> None:
+    source = written(folder, LAW.replace("LINE", "print(x)"), "my_fabric.py")
+    sheet = {"plyflow_material": 1, "name": "bad", "plugin": "./my_fabric.py", "thickness": "0.3 mm", "areal_mass": "300 g/m2", "with": {}}
+    (folder / "bad.yaml").write_text(json.dumps(sheet))
+    frame = {"plugin": "coupon-picture-frame", "with": {"material": "bad.yaml", "path": ["0.3 rad"]}}
+    (folder / "workflow.yaml").write_text(json.dumps({"plyflow": 1, "name": "bad", "steps": {"frame": frame}}))
+    words = [str(plyflow.program()), "validate", str(folder / "workflow.yaml"), "--trust", "--format", "json"]
+    told = json.loads(subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False).stdout)
+    assert any(f"{source}:11:5: membrane: a law cannot print" in finding["message"] for finding in told), told
 
 
 def test_the_command_says_what_is_wrong_with_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -156,3 +156,97 @@ impl Layout {
         i32::try_from(distance).map_err(|_| "the code is larger than 2 GiB".into())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use object::write::{self, StandardSection, StandardSegment, SymbolSection};
+    use object::{RelocationEncoding, RelocationFlags, SymbolFlags, SymbolKind, SymbolScope};
+
+    /// An object whose function reads 27 from a section of constants, calls a function `called` with it, and returns what that gives.
+    fn cube_root_of_27(called: &str, kind: RelocationKind) -> write::Object<'static> {
+        let mut made = write::Object::new(
+            object::BinaryFormat::Elf,
+            object::Architecture::X86_64,
+            object::Endianness::Little,
+        );
+        let text = made.section_id(StandardSection::Text);
+        let data = made.section_id(StandardSection::ReadOnlyData);
+        // sub rsp, 8; movsd xmm0, [rip + ..]; call ..; add rsp, 8; ret
+        let code = [
+            0x48, 0x83, 0xec, 0x08, 0xf2, 0x0f, 0x10, 0x05, 0, 0, 0, 0, 0xe8, 0, 0, 0, 0, 0x48,
+            0x83, 0xc4, 0x08, 0xc3,
+        ];
+        let symbol = |name: &str, section, kind| write::Symbol {
+            name: name.into(),
+            value: 0,
+            size: 0,
+            kind,
+            scope: SymbolScope::Linkage,
+            weak: false,
+            section,
+            flags: SymbolFlags::None,
+        };
+        let function = made.add_symbol(symbol("entry", SymbolSection::Undefined, SymbolKind::Text));
+        made.add_symbol_data(function, text, &code, 16);
+        let constant = made.section_symbol(data);
+        made.append_section_data(data, &27f64.to_le_bytes(), 8);
+        let outside = made.add_symbol(symbol(called, SymbolSection::Undefined, SymbolKind::Text));
+        let relocations = [(8, constant, RelocationKind::Relative), (13, outside, kind)];
+        for (offset, symbol, kind) in relocations {
+            let relocation = write::Relocation {
+                offset,
+                symbol,
+                addend: -4,
+                flags: RelocationFlags::Generic {
+                    kind,
+                    encoding: RelocationEncoding::Generic,
+                    size: 32,
+                },
+            };
+            made.add_relocation(text, relocation).unwrap();
+        }
+        made
+    }
+
+    fn load(made: &write::Object<'_>) -> Result<Code, String> {
+        Code::load(&made.write().unwrap(), "entry")
+    }
+
+    #[test]
+    fn code_reads_its_constants_and_calls_functions() {
+        let code = load(&cube_root_of_27("cbrt", RelocationKind::PltRelative)).unwrap();
+        // SAFETY: the bytes above are a function that takes nothing and returns a double.
+        let entry: extern "C" fn() -> f64 = unsafe { std::mem::transmute(code.entry()) };
+        assert_eq!(entry(), 3.0);
+    }
+
+    #[test]
+    fn what_a_law_has_not_is_refused_by_name() {
+        let why = |made: &write::Object<'_>| load(made).err().unwrap();
+        let unknown = cube_root_of_27("PyErr_SetNone", RelocationKind::PltRelative);
+        assert_eq!(
+            why(&unknown),
+            "the code calls PyErr_SetNone, which is not there for a law"
+        );
+        let table = cube_root_of_27("cbrt", RelocationKind::GotRelative);
+        assert!(why(&table).contains("is not known here"), "{}", why(&table));
+        let mut variable = cube_root_of_27("cbrt", RelocationKind::PltRelative);
+        let segment = variable.segment_name(StandardSegment::Data).to_vec();
+        let data = variable.add_section(segment, b".data.mine".to_vec(), SectionKind::Data);
+        variable.append_section_data(data, &[1; 8], 8);
+        assert_eq!(
+            why(&variable),
+            "the code has variables of its own (.data.mine)"
+        );
+        let why = Code::load(b"no object", "entry").err().unwrap();
+        assert!(why.starts_with("object:"), "{why}");
+    }
+
+    #[test]
+    fn an_object_without_the_function_is_refused() {
+        let made = cube_root_of_27("cbrt", RelocationKind::PltRelative);
+        let why = Code::load(&made.write().unwrap(), "other").err().unwrap();
+        assert_eq!(why, "there is no function other in the code");
+    }
+}
