@@ -326,3 +326,17 @@ def test_what_an_interpreter_costs_is_counted(place: Place) -> None:
 def _record(place: Place) -> str:
     text = next((place.folder / ".plyflow").rglob("*.record.json")).read_text()
     return text[: text.rindex("}") + 1]
+
+
+def test_another_interpreter_has_its_own_packages_alone(place: Place) -> None:
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(place.folder / "bare")], check=True)
+    other = {**place.environment(), "PLYFLOW_PYTHON": str(place.folder / "bare" / "bin" / "python")}
+    command = [str(plyflow.program()), "run", "--no-report", "--trust", str(place.workflow)]
+    place.step("step.write_attributes({})")
+    refused = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, env=other, check=False)
+    said = " ".join(refused.stderr.replace("│", " ").split())
+    assert refused.returncode == 3 and "No module named 'numpy'" in said, "the numpy beside the package `plyflow` is of another interpreter"
+    # A step that needs none runs there.
+    (place.folder / "made.py").write_text('import plyflow\n@plyflow.step("made", output="x")\ndef run(step):\n    """Does."""\n    step.log("done")\n')
+    done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, env=other, check=False)
+    assert done.returncode == 0, done.stderr

@@ -11,8 +11,12 @@ use std::time::Duration;
 /// Ending of the name of a plugin in Python.
 pub(super) const SUFFIX: &str = ".py";
 
-/// What the interpreter does first: it forgets the folder where one happens to stand, in which anything may lie.
-const BEGIN: &str = "import sys; sys.path[:] = [p for p in sys.path if p]; from plyflow._plugin import main; main()";
+/// What the interpreter does first: it forgets the folder where one happens to stand, in which anything may lie, and takes the package `plyflow`
+/// alone from the folder that the first word names. That folder may be the `site-packages` of another interpreter, with a numpy that is not
+/// this one's.
+const BEGIN: &str = "import sys, importlib.util as u; sys.path[:] = [p for p in sys.path if p]; f = sys.argv.pop(1) + '/plyflow'; \
+    s = u.spec_from_file_location('plyflow', f + '/__init__.py', submodule_search_locations=[f]); \
+    sys.modules['plyflow'] = m = u.module_from_spec(s); s.loader.exec_module(m); from plyflow._plugin import main; main()";
 
 /// By these words a file in a folder of plugins is known to be one: no other is ever run.
 const MARKS: [&str; 2] = ["@plyflow.step(", "@plyflow.law("];
@@ -31,7 +35,7 @@ const NOTE_VERSION: u32 = 1;
 pub struct Python {
     /// The interpreter: a path, or a name that the system looks for.
     pub interpreter: String,
-    /// The folder that holds the package `plyflow`; `None`: the interpreter has it.
+    /// The folder that holds the package `plyflow`; `None`: it did not come with this program.
     pub package: Option<Utf8PathBuf>,
     /// The library of which that of a step is a copy; `None`: this installation has none.
     pub bridge: Option<Utf8PathBuf>,
@@ -66,8 +70,11 @@ struct Note {
 /// Why no library can be made.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum NotMade {
-    #[error("this installation has no library for steps in Python: build or install Plyflow again")]
-    NoBridge,
+    #[error(
+        "this installation lacks what plugins in Python need: the package `plyflow` or the library that carries steps. Install Plyflow from its wheel, \
+         or run it from the tree in which it was built"
+    )]
+    Incomplete,
     #[error(
         "there is no place for what is made of it: expected an absolute path in XDG_CACHE_HOME or HOME"
     )]
@@ -108,14 +115,15 @@ impl Python {
     }
 
     pub(super) fn make(&self, source: &Utf8Path) -> Result<Utf8PathBuf, NotMade> {
-        let bridge = self.bridge.as_ref().ok_or(NotMade::NoBridge)?;
+        let bridge = self.bridge.as_ref().ok_or(NotMade::Incomplete)?;
+        let package = self.package.as_ref().ok_or(NotMade::Incomplete)?;
         let folder = self.folder.as_ref().ok_or(NotMade::NoFolder)?;
         if let Some(library) = self.kept(folder, source) {
             return Ok(library);
         }
         private(folder).map_err(|e| NotMade::Io(folder.clone(), e))?;
         let mut command = Command::new(&self.interpreter);
-        command.args(["-B", "-c", BEGIN]).arg(source);
+        command.args(["-B", "-c", BEGIN]).arg(package).arg(source);
         command
             .arg("--into")
             .arg(folder)
@@ -123,11 +131,9 @@ impl Python {
             .arg(bridge);
         command.env("PYTHONHASHSEED", "0");
         // What the environment says of packages does not decide what a plugin does.
-        match &self.package {
-            Some(package) => command.env("PYTHONPATH", package),
-            None => command.env_remove("PYTHONPATH"),
-        };
-        command.env_remove("PYTHONHOME").env_remove("PYTHONSTARTUP");
+        for name in ["PYTHONPATH", "PYTHONHOME", "PYTHONSTARTUP"] {
+            command.env_remove(name);
+        }
         let interpreter = || self.interpreter.clone();
         let (said, status) = answer_within(MAKE_LIMIT, command)
             .map_err(|e| NotMade::NoInterpreter(interpreter(), e))?;

@@ -13,8 +13,11 @@ use std::process::{Command, ExitStatus, Stdio};
 /// The file beside the library that says with what it was made. It is not part of the library, because a path says nothing of what a step does.
 const BESIDE: &str = "python.json";
 
-/// What the interpreter does first: it forgets the folder where one happens to stand.
-const BEGIN: &str = "import sys; sys.path[:] = [p for p in sys.path if p]; from plyflow._step_process import main; main()";
+/// What the interpreter does first: it forgets the folder where one happens to stand, and takes this package alone from the folder that the
+/// first word names. That folder may be the `site-packages` of another interpreter, with a numpy that is not this one's.
+const BEGIN: &str = "import sys, importlib.util as u; sys.path[:] = [p for p in sys.path if p]; f = sys.argv.pop(1) + '/plyflow'; \
+    s = u.spec_from_file_location('plyflow', f + '/__init__.py', submodule_search_locations=[f]); \
+    sys.modules['plyflow'] = m = u.module_from_spec(s); s.loader.exec_module(m); from plyflow._step_process import main; main()";
 
 #[derive(Deserialize)]
 struct Beside {
@@ -61,9 +64,9 @@ impl Child {
         let mut command = Command::new(&interpreter);
         // Where one happens to stand, and what the environment says of packages, does not decide what a step does.
         command
-            .args(["-B", "-c", BEGIN])
+            .args(["-B", "-c", BEGIN, &beside.package])
             .arg(theirs.as_raw_fd().to_string())
-            .env("PYTHONPATH", &beside.package)
+            .env_remove("PYTHONPATH")
             .env_remove("PYTHONSTARTUP")
             .env_remove("PYTHONHOME")
             .env("PYTHONHASHSEED", "0")
