@@ -40,13 +40,13 @@ def program() -> Path:
     raise NotFound(f"there is no program `plyflow`: looked for {looked}; install the wheel, or set PLYFLOW_PROGRAM")
 
 
-def shell(name: str) -> Path:
+def carrier(name: str) -> Path:
     """A library of which copies are made that hold what was written in Python. It lies beside the plugins of the program.
 
     Raises:
         NotFound: it is not there; says where it was looked for.
 
-    >>> shell("python_law").name
+    >>> carrier("python_law").name
     'libplyflow_python_law.so'
     """
     folder = program().resolve().parent

@@ -180,7 +180,8 @@ def _finding(error: Exception, function: Any, source: str) -> Finding:
         "File ",
     )
     useful = [part for part in said if not any(part == b or (b and part.startswith(b)) for b in boring)]
-    message = f"numba cannot compile {function.__name__}: {useful[0] if useful else type(error).__name__}"
+    reason = re.sub(r"type Module\(<module '([^']+)'.*?>\)", r"module \1", useful[0]) if useful else type(error).__name__
+    message = f"numba cannot compile {function.__name__}: {reason}"
     return Finding(file, line, 1, "error", message, None, rules.WHAT_A_LAW_MAY, rules.hint_for(text))
 
 

@@ -1,4 +1,4 @@
-"""Makes the library of a law: compiled code behind a copy of the shell (solver-plugins/door/python-law)."""
+"""Makes the library of a law: compiled code behind a copy of the carrier (solver-plugins/door/python-law)."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from importlib import util
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Sequence
 
-from ._installation import shell
-from .errors import Finding, InvalidInput, MissingPackage, PlyflowError
+from ._installation import carrier
+from .errors import Finding, InvalidInput, MissingPackage, NotFound, PlyflowError
 
 if TYPE_CHECKING:
     from .laws import Law
 
-# As the shell has them (solver-plugins/door/python-law/src/payload.rs).
+# As the carrier has them (solver-plugins/door/python-law/src/payload.rs).
 MAGIC = b"PLYFLOW-PY-LAW-1"
 LAYOUT = 1
 
-# Levels of the x86-64 ABI for which code is made. The shell takes the best that the processor has. Both give the same bits, as nothing is fused
+# Levels of the x86-64 ABI for which code is made. The carrier takes the best that the processor has. Both give the same bits, as nothing is fused
 # or summed in another order; the second only does four points at a time. The processor of this machine has no part in it, so that the same
 # source and the same numba give the same library everywhere.
 LEVELS = ("x86-64", "x86-64-v3")
@@ -38,15 +38,24 @@ sys.stdout.buffer.write(ctypes.string_at(fault.data, fault.length))
 """
 
 
-def make(law: Law, source: Path, library: Path, levels: Sequence[str] = LEVELS) -> dict[str, Any]:
+def make(law: Law, source: Path, library: Path, levels: Sequence[str] = LEVELS, bare: Path | None = None) -> dict[str, Any]:
     """Compiles a law and writes its library.
+
+    Args:
+        law: as it was found in the file.
+        source: the file.
+        library: where it goes.
+        levels: for which processors.
+        bare: the carrier; that of this installation where it is left out.
 
     Returns:
         ``library``: its path; ``watch``: the files and folders whose change means to make it anew.
     """
     if util.find_spec("numba") is None:
         raise MissingPackage(f"a law in Python needs the package numba, which {sys.executable} does not have: {sys.executable} -m pip install numba")
-    bare = shell("python_law")
+    place = bare or carrier("python_law")
+    if not place.is_file():
+        raise NotFound(f"there is no library {place} for laws in Python: build or install Plyflow again")
     with tempfile.TemporaryDirectory() as scratch:
         told = _compiled(law, source, levels, Path(scratch))
         code = bytearray()
@@ -68,8 +77,8 @@ def make(law: Law, source: Path, library: Path, levels: Sequence[str] = LEVELS) 
     }
     text = json.dumps(header, allow_nan=False).encode()
     payload = len(text).to_bytes(8, "little") + text + bytes(code)
-    _write(library, bare.read_bytes() + payload + len(payload).to_bytes(8, "little") + MAGIC, source)
-    return {"library": str(library.absolute()), "watch": sorted({*first["watch"], str(bare)})}
+    _write(library, place.read_bytes() + payload + len(payload).to_bytes(8, "little") + MAGIC, source)
+    return {"library": str(library.absolute()), "watch": sorted({*first["watch"], str(place)})}
 
 
 def _write(library: Path, content: bytes, source: Path) -> None:

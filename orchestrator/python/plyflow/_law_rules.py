@@ -155,6 +155,8 @@ def hint_for(text: str) -> str:
         return "define it in the file, or declare it as a parameter and write p. before it"
     if "Untyped global name" in text or "Cannot determine Numba type" in text:
         return "a global name must be a number, a tuple of numbers or a function; take functions out of a module by name (from module import name)"
+    if "of type Module" in text:
+        return "numba does not know this function of the module: write it with others"
     if "Unknown attribute" in text:
         return "p has the declared parameters, thickness and areal_mass"
     if "unify" in text:
@@ -181,5 +183,6 @@ def refuse_outside(names: Sequence[str], function: Any, source: str) -> None:
                 "it makes an array or another object, and nothing may be allocated for a point",
                 _NO_ARRAY,
             )
-        if name.startswith(("Py", "_Py", "numba_")):
+        # Whatever else is no function of mathematics the carrier refuses by name.
+        if name.startswith(("Py", "_Py", "numba_gil", "numba_unpickle")):
             refuse(f"its code would call Python ({name})", f"use {WHAT_A_LAW_MAY}; it must raise nothing and print nothing")

@@ -74,7 +74,7 @@ def _all(kind: str) -> Sequence[str]:
 
 
 def _parameters(values: Sequence[Value], at: tuple[str, ...], around: dict[str, Any]) -> str:
-    """The named tuple of the parameters out of the row `v`, as the shell fills it: a list has two places, which say where its values are."""
+    """The named tuple of the parameters out of the row `v`, as the carrier fills it: a list has two places, which say where its values are."""
     places: dict[tuple[str, ...], int] = {}
     place = 0
     for value in values:

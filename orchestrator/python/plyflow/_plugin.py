@@ -133,7 +133,8 @@ def make(file: Path, into: Path, bridge: Path) -> Dict[str, Any]:
     else:
         from . import laws
 
-        made = laws._make(found[0], file, into)
+        # It lies where that of steps does.
+        made = laws._make(found[0], file, into, bridge.with_name("libplyflow_python_law.so"))
         library = Path(made["library"])
         watch += [Path(p) for p in made["watch"]]
     return {"library": str(library), "watch": sorted({str(path) for path in watch})}

@@ -48,7 +48,7 @@ RETURNS: dict[str, tuple[str, ...]] = {
 }
 # The two that every sheet has.
 OF_SHEET = ("thickness", "areal_mass")
-# As the shell has it (solver-plugins/door/python-law/src/law.rs).
+# As the carrier has it (solver-plugins/door/python-law/src/law.rs).
 MOST_HISTORY = 256
 
 _NUMBERS = ("number", "quantity", "integer")
@@ -202,7 +202,7 @@ class Value:
         self.default = declaration.get("default")
 
     def header(self) -> dict[str, Any]:
-        """What the shell is told of it."""
+        """What the carrier is told of it."""
         form = "number" if self.form == "integer" else self.form
         return {"path": list(self.path), "form": form, "words": self.words}
 
@@ -337,13 +337,14 @@ def _frames(error: BaseException) -> list[tuple[str, int]]:
     return [(frame.filename, frame.lineno or 0) for frame in traceback.extract_tb(error.__traceback__)]
 
 
-def _make(definition: Any, source: Path, into: Path) -> dict[str, Any]:
+def _make(definition: Any, source: Path, into: Path, bare: Path) -> dict[str, Any]:
     """Makes the library of a law for the program, in a folder that is named for its bytes.
 
     Args:
         definition: of :func:`plyflow.law`, as :func:`plyflow.steps.defined` lists it.
         source: the file.
         into: the folder for what is made.
+        bare: the carrier of laws, of which the library is a copy.
 
     Returns:
         ``library``: its path; ``watch``: the files and folders whose change means to make it anew.
@@ -351,7 +352,7 @@ def _make(definition: Any, source: Path, into: Path) -> dict[str, Any]:
     Raises:
         InvalidInput: the law cannot be compiled; with file, line, reason and what to do.
         MissingPackage: numba is not there.
-        NotFound: the shell of laws is not there.
+        PlyflowError: the carrier is not there.
     """
     import tempfile
     from hashlib import sha256
@@ -359,7 +360,7 @@ def _make(definition: Any, source: Path, into: Path) -> dict[str, Any]:
     from ._law_library import make
 
     with tempfile.TemporaryDirectory(dir=into) as scratch:
-        told = make(definition.more["law"], source, Path(scratch) / f"{source.stem}.so")
+        told = make(definition.more["law"], source, Path(scratch) / f"{source.stem}.so", bare=bare)
         made = Path(told["library"])
         folder = into / sha256(made.read_bytes()).hexdigest()[:24]
         folder.mkdir(exist_ok=True)

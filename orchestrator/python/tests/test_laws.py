@@ -247,6 +247,55 @@ def test_the_same_source_gives_the_same_bytes_in_any_folder_and_environment(tmp_
     assert third.read_bytes() != second.read_bytes()
 
 
+FUNCTIONS = '''
+import math
+
+import numpy as np
+import plyflow
+from plyflow import declare
+
+TABLE = np.array([0.1, 0.7, 1.3, 2.9])
+TUPLE = (1.0, 2.0, 3.5)
+
+
+@plyflow.law("functions", parameters={"n": declare.integer(default=3, doc="A power.")})
+def membrane(p, c11, c22, c12):
+    """Functions of mathematics, tables, loops."""
+    x = abs(c12) + 0.2
+    a = math.sin(x) + math.cos(x) + math.tan(x) + math.asin(0.1 * x) + math.acos(0.1 * x) + math.atan(x) + math.atan2(x, c11)
+    a += math.sinh(x) + math.cosh(x) + math.tanh(x) + math.asinh(x) + math.acosh(1.0 + x) + math.atanh(0.1 * x)
+    a += math.exp(x) + math.expm1(x) + math.log(x) + math.log1p(x) + math.log10(x) + math.log2(x) + math.sqrt(x) + math.hypot(x, c11)
+    b = x**0.3 + math.pow(x, 1.7) + x**p.n + x ** (-p.n) + np.exp(x) + np.sqrt(x) + np.cbrt(x) + np.arctan2(x, c11) + np.maximum(x, 0.3)
+    b += math.floor(3 * x) + math.ceil(3 * x) + math.trunc(3 * x) + (5 * x) % 0.7 + (5 * x) // 0.7 + math.copysign(x, c12) + round(3 * x)
+    b += math.erf(x) + math.erfc(x) + math.gamma(x + 1.0) + math.lgamma(x + 1.0) + math.ldexp(x, 3) + np.sign(c12)
+    c, i = 0.0, 0
+    while i < len(TUPLE):
+        c += TUPLE[i] * x**i
+        i += 1
+    for entry in TABLE:
+        c += entry * x
+    return a, b, c, between(x)
+
+
+def between(x):
+    for i in range(len(TABLE) - 1):
+        if x < TABLE[i + 1]:
+            return TABLE[i] + (x - TABLE[i]) / (TABLE[i + 1] - TABLE[i])
+    return TABLE[-1]
+'''
+
+
+def test_functions_of_mathematics_and_tables_are_those_of_python_to_the_last_bits(tmp_path: Path) -> None:
+    source = written(tmp_path, FUNCTIONS)
+    law = laws.load(source)
+    given = {"n": 3, "thickness": 1e-3, "areal_mass": 1.0}
+    metric, _ = states()
+    stress, energy, _, _ = Sheet(made(source), given).membrane(metric)
+    for lane in range(metric.shape[1]):
+        want = law(law.sheet(**given), *map(float, metric[:, lane]))
+        assert np.allclose([*stress[:, lane], energy[lane]], want, rtol=1e-14, atol=0.0)
+
+
 def test_measured_bounds_are_above_the_tangents_and_near_them(tmp_path: Path) -> None:
     # Both families share their strain, and one term ties them to shear: the bound is that of a full matrix.
     text = '''
@@ -359,7 +408,7 @@ def test_modules_beside_the_law_are_watched_and_compiled(tmp_path: Path) -> None
     told = make(laws.load(source), source, tmp_path / "made" / "libbad.so")
     beside = [path for path in told["watch"] if path.startswith(str(tmp_path))]
     assert beside == [str(tmp_path / "doubling.py"), str(source)]
-    # A new version of the compiler, or of the shell, makes it anew.
+    # A new version of the compiler, or of the carrier, makes it anew.
     names = [Path(path).name for path in told["watch"]]
     assert {"numba", "llvmlite", "libplyflow_python_law.so"} <= {name.split("-")[0] for name in names}, names
     assert told["library"] == str(tmp_path / "made" / "libbad.so")
@@ -440,7 +489,7 @@ def test_the_command_says_what_is_wrong_with_a_file(tmp_path: Path, capsys: pyte
     assert f"{source}:11:" in capsys.readouterr().err
 
 
-def test_the_shell_alone_is_no_plugin_for_the_program() -> None:
+def test_the_carrier_alone_is_no_plugin_for_the_program() -> None:
     told = subprocess.run([str(plyflow.program()), "plugins", "--format", "json"], capture_output=True, text=True, check=True)
     said = json.loads(told.stdout)
     assert not said["broken"], said["broken"]

@@ -1,11 +1,11 @@
 //! Object code, laid down in memory so that it can run.
 //!
-//! This does what a linker does, for the one case that there is: an object of one function for x86-64, position independent, which reads its
+//! This does what a linker does, for the one case that there is: an object of few functions for x86-64, position independent, which reads its
 //! own constants and calls the functions of [`crate::functions`]. Everything else is refused by name.
 
 use crate::functions;
 use memmap2::{Mmap, MmapMut};
-use object::read::elf::ElfFile64;
+use object::read::elf::{ElfFile64, ElfSection64};
 use object::{
     Object, ObjectSection, ObjectSymbol, Relocation, RelocationKind, RelocationTarget,
     SectionIndex, SectionKind, SymbolIndex,
@@ -43,10 +43,11 @@ impl Code {
             memory[*at..at + bytes.len()].copy_from_slice(bytes);
             for (offset, relocation) in section.relocations() {
                 let place = at + offset as usize;
-                let value = layout.distance(&file, &relocation, place)?;
-                let bytes = memory.get_mut(place..place + 4);
+                let begins = memory.as_ptr() as i64;
+                let value = layout.value(&file, &relocation, place, begins)?;
+                let bytes = memory.get_mut(place..place + value.len());
                 let bytes = bytes.ok_or("a relocation lies outside of its section")?;
-                bytes.copy_from_slice(&value.to_le_bytes());
+                bytes.copy_from_slice(&value);
             }
         }
         for (address, at) in layout.functions.values() {
@@ -88,15 +89,12 @@ impl Layout {
             match section.kind() {
                 // How to unwind: nothing does, as nothing is thrown.
                 _ if name == ".eh_frame" => {}
+                // Written to by the loader alone: it holds addresses.
+                SectionKind::Data if name.starts_with(".data.rel.ro") => new.add(&section),
                 SectionKind::Text
                 | SectionKind::ReadOnlyData
                 | SectionKind::ReadOnlyString
-                | SectionKind::ReadOnlyDataWithRel => {
-                    let align = section.align().clamp(1, 4096) as usize;
-                    let at = new.size.next_multiple_of(align);
-                    new.sections.insert(section.index().0, at);
-                    new.size = at + section.size() as usize;
-                }
+                | SectionKind::ReadOnlyDataWithRel => new.add(&section),
                 SectionKind::Data | SectionKind::UninitializedData | SectionKind::Tls
                     if section.size() > 0 =>
                 {
@@ -119,6 +117,15 @@ impl Layout {
         Ok(new)
     }
 
+    fn add(&mut self, section: &ElfSection64<'_, '_>) {
+        // Memory begins at a page, so that larger alignments need more than is given here; LLVM asks for 64 bytes at most.
+        let at = self
+            .size
+            .next_multiple_of(section.align().clamp(1, 4096) as usize);
+        self.sections.insert(section.index().0, at);
+        self.size = at + section.size() as usize;
+    }
+
     /// Where a symbol lies.
     fn place(&self, file: &ElfFile64<'_>, index: SymbolIndex) -> Result<usize, String> {
         let symbol = file.symbol_by_index(index).map_err(|e| e.to_string())?;
@@ -131,29 +138,35 @@ impl Layout {
         Ok(section + symbol.address() as usize)
     }
 
-    /// What a relocation at `place` asks for: how far its target is from there.
-    fn distance(
+    /// What a relocation at `place` asks to be written there: how far its target is from it, or where the target is in a memory that begins at
+    /// `begins`, which is how tables of constants are found.
+    fn value(
         &self,
         file: &ElfFile64<'_>,
         relocation: &Relocation,
         place: usize,
-    ) -> Result<i32, String> {
-        let near = matches!(
-            relocation.kind(),
-            RelocationKind::Relative | RelocationKind::PltRelative
-        );
+        begins: i64,
+    ) -> Result<Vec<u8>, String> {
         let RelocationTarget::Symbol(target) = relocation.target() else {
             return Err("a relocation has no symbol".into());
         };
-        if !near || relocation.size() != 32 || relocation.has_implicit_addend() {
-            return Err(format!(
+        let target = || {
+            let at = self.place(file, target)? as i64;
+            Ok::<i64, String>(at + relocation.addend())
+        };
+        match (relocation.kind(), relocation.size()) {
+            _ if relocation.has_implicit_addend() => Err("a relocation has no addend".into()),
+            (RelocationKind::Relative | RelocationKind::PltRelative, 32) => {
+                let distance = i32::try_from(target()? - place as i64);
+                let distance = distance.map_err(|_| "the code is larger than 2 GiB")?;
+                Ok(distance.to_le_bytes().to_vec())
+            }
+            (RelocationKind::Absolute, 64) => Ok((begins + target()?).to_le_bytes().to_vec()),
+            _ => Err(format!(
                 "a relocation of kind {:?} is not known here",
                 relocation.flags()
-            ));
+            )),
         }
-        let target = self.place(file, target)? as i64;
-        let distance = target + relocation.addend() - place as i64;
-        i32::try_from(distance).map_err(|_| "the code is larger than 2 GiB".into())
     }
 }
 
@@ -219,6 +232,40 @@ mod tests {
         // SAFETY: the bytes above are a function that takes nothing and returns a double.
         let entry: extern "C" fn() -> f64 = unsafe { std::mem::transmute(code.entry()) };
         assert_eq!(entry(), 3.0);
+    }
+
+    #[test]
+    fn tables_hold_the_addresses_of_constants() {
+        // The entry is read as data here: eight bytes in a section of their own that point to the constant behind the code.
+        let mut made = cube_root_of_27("cbrt", RelocationKind::PltRelative);
+        let segment = made.segment_name(StandardSegment::Data).to_vec();
+        let table = made.add_section(segment, b".data.rel.ro".to_vec(), SectionKind::Data);
+        made.append_section_data(table, &[0; 8], 8);
+        let data = made.section_id(StandardSection::ReadOnlyData);
+        let constant = made.section_symbol(data);
+        let relocation = write::Relocation {
+            offset: 0,
+            symbol: constant,
+            addend: 0,
+            flags: RelocationFlags::Generic {
+                kind: RelocationKind::Absolute,
+                encoding: RelocationEncoding::Generic,
+                size: 64,
+            },
+        };
+        made.add_relocation(table, relocation).unwrap();
+        let code = load(&made).unwrap();
+        let begins = code.memory.as_ptr() as usize;
+        let words = code.memory.chunks_exact(8);
+        let words: Vec<u64> = words
+            .map(|w| u64::from_le_bytes(w.try_into().unwrap()))
+            .collect();
+        let inside =
+            |word: &&u64| (begins..begins + code.memory.len()).contains(&(**word as usize));
+        let found: Vec<&u64> = words.iter().filter(inside).collect();
+        assert_eq!(found.len(), 1, "{words:x?}");
+        let at = *found[0] as usize - begins;
+        assert_eq!(code.memory[at..at + 8], 27f64.to_le_bytes());
     }
 
     #[test]

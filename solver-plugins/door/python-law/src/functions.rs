@@ -39,6 +39,10 @@ unsafe extern "C" fn sincos(x: f64, sine: *mut f64, cosine: *mut f64) {
 /// the sheet's, and count no references. So this is there for the code that would call it, and is never called.
 extern "C" fn nothing_to_free(_: *mut c_void) {}
 
+extern "C" fn ldexp(x: f64, power: i32) -> f64 {
+    libm::ldexp(x, power)
+}
+
 extern "C" fn lgamma(x: f64) -> f64 {
     libm::lgamma(x)
 }
@@ -66,6 +70,17 @@ macro_rules! table {
 
 /// The address of a function by its symbol; `None`: compiled code may not call it.
 pub fn address(symbol: &str) -> Option<usize> {
+    // numba has some of them in a library of its own, under names of its own. What it calls `numba_round` rounds otherwise.
+    match symbol.strip_prefix("numba_") {
+        Some("gamma") => of_mathematics("tgamma"),
+        Some("fixed_fmod") => of_mathematics("fmod"),
+        Some("round") => None,
+        Some(name) => of_mathematics(name),
+        None => of_mathematics(symbol),
+    }
+}
+
+fn of_mathematics(symbol: &str) -> Option<usize> {
     table!(symbol:
         one sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp exp2 exp10 expm1 log log2 log10 log1p cbrt erf erfc tgamma
             floor ceil trunc rint round roundeven fabs sqrt;
@@ -73,7 +88,8 @@ pub fn address(symbol: &str) -> Option<usize> {
         three fma;
         also
             "lgamma" => lgamma as extern "C" fn(f64) -> f64 as usize,
-            "nearbyint" => address("rint")?,
+            "ldexp" => ldexp as extern "C" fn(f64, i32) -> f64 as usize,
+            "nearbyint" => of_mathematics("rint")?,
             "__powidf2" => powi as extern "C" fn(f64, i32) -> f64 as usize,
             "NRT_MemInfo_call_dtor" => nothing_to_free as extern "C" fn(*mut c_void) as usize,
             "sincos" => sincos as unsafe extern "C" fn(f64, *mut f64, *mut f64) as usize,
@@ -133,6 +149,9 @@ mod tests {
             );
         }
         assert!((one("erf")(x) + one("erfc")(x) - 1.0).abs() < 1e-15);
+        assert!((one("numba_gamma")(5.0) - 24.0).abs() < 1e-12);
+        assert_eq!(one("numba_cbrt")(27.0), 3.0);
+        assert_eq!(ldexp(3.0, -2), 0.75);
         assert!((one("tgamma")(5.0) - 24.0).abs() < 1e-12);
         assert!((one("lgamma")(5.0) - 24f64.ln()).abs() < 1e-14);
         assert!((one("acosh")(1.5) - 1.5f64.acosh()).abs() < 1e-15);
@@ -148,7 +167,15 @@ mod tests {
 
     #[test]
     fn what_is_no_arithmetic_cannot_be_called() {
-        for symbol in ["malloc", "printf", "PyErr_SetNone", "dlopen", "sinf"] {
+        for symbol in [
+            "malloc",
+            "printf",
+            "numba_gil_ensure",
+            "numba_round",
+            "PyErr_SetNone",
+            "dlopen",
+            "sinf",
+        ] {
             assert_eq!(address(symbol), None, "{symbol}");
         }
     }

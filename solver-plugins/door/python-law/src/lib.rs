@@ -1,4 +1,4 @@
-//! The shell of a fabric law in Python.
+//! The carrier of a fabric law in Python.
 //!
 //! `plyflow.laws` compiles a law with numba, copies this library and appends a payload to the copy: the manifest, the list of parameters, and
 //! the object code. The copy is a plugin as any other. It reads its own payload when the host asks for its descriptor, lays the code down in

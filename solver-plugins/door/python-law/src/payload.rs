@@ -125,7 +125,7 @@ fn tail(file: &mut File) -> Result<Vec<u8>, String> {
     let said = |e: std::io::Error| e.to_string();
     let whole = file.metadata().map_err(said)?.len();
     let none = || {
-        "there is no law in it: this is the bare shell, of which `python -m plyflow.laws` makes copies".to_owned()
+        "there is no law in it: this is the bare carrier, of which `python -m plyflow.laws` makes copies".to_owned()
     };
     let before = whole.checked_sub(TRAILER).ok_or_else(none)?;
     file.seek(SeekFrom::Start(before)).map_err(said)?;
@@ -190,6 +190,6 @@ mod tests {
         let why =
             Payload::of_library(a_library_without_a_law_says_that_it_has_none as fn() as usize)
                 .unwrap_err();
-        assert!(why.contains("bare shell"), "{why}");
+        assert!(why.contains("bare carrier"), "{why}");
     }
 }
