@@ -1,4 +1,4 @@
-"""Compiles the functions of a law, in a process of its own: ``python -m plyflow._law_code SOURCE LAW LEVEL FOLDER``.
+"""Compiles the functions of a law, in a process of its own, with the words SOURCE LAW LEVEL FOLDER.
 
 The process is new for each level of processor, as numba takes its settings from the environment when it is imported, and counts what it compiles:
 so the same source gives the same bytes. Object code and ``answer.json`` go to FOLDER.
@@ -24,6 +24,7 @@ from .laws import RETURNS, Law, Value, _tuple, load
 
 
 def main() -> None:
+    """What the process does."""
     source, name, level, folder = sys.argv[1:5]
     place = Path(folder)
     answer: dict[str, Any] = {"findings": []}
@@ -239,7 +240,3 @@ def _drop_unused(llvm: Any, parsed: Any, machine: Any) -> None:
     passes.add_global_dce_pass()
     passes.add_strip_dead_prototypes_pass()
     passes.run(parsed)
-
-
-if __name__ == "__main__":
-    main()

@@ -104,11 +104,22 @@ def _write(library: Path, content: bytes, source: Path) -> None:
         Path(file.name).unlink(missing_ok=True)
 
 
+# The package `plyflow` alone is taken from where it lies, which may be the `site-packages` of another interpreter than this one.
+_BEGIN = """
+import sys, importlib.util as util
+sys.path[:] = [path for path in sys.path if path]
+folder = sys.argv.pop(1)
+found = util.spec_from_file_location("plyflow", folder + "/__init__.py", submodule_search_locations=[folder])
+sys.modules["plyflow"] = package = util.module_from_spec(found)
+found.loader.exec_module(package)
+from plyflow._law_code import main
+main()
+"""
+
+
 def _environment(level: str) -> dict[str, str]:
-    """That of a process that compiles for `level`. No setting of the user reaches the code."""
+    """That of a process that compiles for `level`. No setting of numba's that the user has made reaches the code."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
-    package = str(Path(__file__).resolve().parent.parent)
-    paths = [package, *filter(None, [kept.get("PYTHONPATH")])]
     set_here = {
         "NUMBA_CPU_NAME": level,
         "NUMBA_CPU_FEATURES": "",
@@ -116,8 +127,6 @@ def _environment(level: str) -> dict[str, str]:
         "NUMBA_DISABLE_INTEL_SVML": "1",
         "NUMBA_DISABLE_JIT": "0",
         "PYTHONHASHSEED": "0",
-        "PYTHONPATH": os.pathsep.join(paths),
-        "PYTHONDONTWRITEBYTECODE": "1",
     }
     return {**kept, **set_here}
 
@@ -128,7 +137,8 @@ def _compiled(law: Law, source: Path, levels: Sequence[str], scratch: Path) -> d
     for level in levels:
         folder = scratch / level
         folder.mkdir()
-        words = [sys.executable, "-m", "plyflow._law_code", str(source), law.name, level, str(folder)]
+        package = str(Path(__file__).resolve().parent)
+        words = [sys.executable, "-B", "-c", _BEGIN, package, str(source), law.name, level, str(folder)]
         # numba reads settings also from a file in the folder where it runs: this one is empty.
         process = subprocess.Popen(
             words, cwd=folder, env=_environment(level), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
