@@ -287,7 +287,7 @@ fn new_plugins() {
         &["element", "my-element", "--c", "--into", "a place"],
     );
     new("new-material", &["material", "my-law", "--rust"]);
-    new("new-bad-name", &["step", "CountSheared", "--c"]);
+    new("new-bad-name", &["step", "My_Step", "--c"]);
     new("new-taken", &["step", "trivial", "--c"]);
     new("new-python-module", &["step", "statistics", "--python"]);
     new("new-without-language", &["step", "mine"]);
