@@ -4,6 +4,7 @@ use crate::emitter::Emitter;
 use crate::process;
 use camino::Utf8Path;
 use plyflow_artifact::seal::{BrokenSeal, read_document, seal, sealed};
+use plyflow_artifact::whole;
 use plyflow_model::job::{self, Cost, LogLevel};
 use serde::{Deserialize, Serialize};
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -136,10 +137,10 @@ impl<'a> Checkpoints<'a> {
             cost,
         };
         let written = serde_json::to_string(&noted).map_err(std::io::Error::from);
-        let new = job.folder.join(format!("{COST}.new"));
-        let written = written
-            .and_then(|text| std::fs::write(&new, seal(&text)))
-            .and_then(|()| std::fs::rename(&new, job.folder.join(COST)));
+        // Under a name of its own until it is whole: an earlier attempt may still write here, too.
+        let file = job.folder.join(COST);
+        let written =
+            written.and_then(|text| whole::write(file.as_std_path(), seal(&text).as_bytes()));
         if let Err(e) = written {
             let text = format!("{}: the cost so far cannot be noted: {e}", job.folder);
             emitter.log(LogLevel::Debug, &text);

@@ -261,6 +261,40 @@ fn a_run_killed_while_it_forms_goes_on_from_its_checkpoint_to_the_same_bytes() {
     );
 }
 
+#[test]
+fn two_attempts_at_a_step_in_one_folder_of_checkpoints_leave_one_that_goes_on_to_the_same_bytes() {
+    let undisturbed = heavy_with_tables();
+    let only = ["--until", "coarse"];
+    assert_eq!(undisturbed.run(&only), well(1, 0));
+
+    // As on a cluster whose network has parted: the attempt that was given up runs on beside its successor, and both write checkpoints.
+    let (given_up, study) = (heavy_with_tables(), heavy_with_tables());
+    let runs = ".plyflow/runs/study";
+    std::fs::create_dir_all(study.path(runs).join("checkpoints")).unwrap();
+    std::fs::create_dir_all(given_up.path(runs)).unwrap();
+    let shared = given_up.path(runs).join("checkpoints");
+    std::os::unix::fs::symlink(study.path(runs).join("checkpoints"), shared).unwrap();
+    let often = ["--until", "coarse", "--checkpoint-every", "0 s"];
+    let mut engines = [given_up.start(&often), study.start(&often)];
+    wait_for("a checkpoint", || !checkpoints(&study).is_empty());
+    // Long enough for some hundreds of files to be written by each.
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    for engine in &mut engines {
+        engine.kill().unwrap();
+        engine.wait().unwrap();
+        wait_for("the workers' end", || workers_of(engine.id()) == 0);
+    }
+    for attempt in [&given_up, &study] {
+        let log = attempt.log();
+        assert!(!log.contains("no more checkpoints"), "{log}");
+        assert!(!log.contains("begins anew"), "{log}");
+    }
+    assert_eq!(study.run(&only), well(1, 0));
+    let said = std::fs::read_to_string(study.path(runs).join("logs/coarse.log")).unwrap();
+    assert!(said.contains("goes on from a checkpoint at t = "), "{said}");
+    assert!(undisturbed.artifacts() == study.artifacts());
+}
+
 /// The coarse run's zones, and one run of the whole `with` something, from `from`.
 fn one_model(from: &str, with: &str) -> String {
     let chain = chain(TWO_ZONES);

@@ -10,16 +10,19 @@ use plyflow_mechanics::archive::Archive;
 use plyflow_sdk::{Host, Log, On, StepError};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
-use std::fs::File;
+use std::fs::{File, Permissions};
 use std::io::{self, BufWriter, Read, Write};
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
 
 /// Bytes of the hash at the end of a file.
 const SEAL: usize = blake3::OUT_LEN;
 
-/// A file that is written under another name, and gets its own when it is whole.
+/// A file that is written under another name, and gets its own when it is whole. The other name is this attempt's alone: on a cluster an earlier
+/// attempt, of which nobody hears any more, may still write into the folder. What both write is the same.
 struct Sealed {
-    file: BufWriter<File>,
+    file: BufWriter<NamedTempFile>,
     hash: blake3::Hasher,
     path: PathBuf,
 }
@@ -37,13 +40,14 @@ fn hasher(path: &Path) -> blake3::Hasher {
 
 impl Sealed {
     fn create(path: &Path) -> io::Result<Self> {
-        let begun = path.with_extension("new");
-        // A pipe that lies there would wait for a reader for ever.
-        if std::fs::symlink_metadata(&begun).is_ok() {
-            std::fs::remove_file(&begun)?;
-        }
+        let folder = path.parent().ok_or(io::ErrorKind::InvalidInput)?;
+        // Whoever may read the store may go on with the run.
+        let begun = tempfile::Builder::new()
+            .prefix("begun-")
+            .permissions(Permissions::from_mode(0o666))
+            .tempfile_in(folder)?;
         Ok(Self {
-            file: BufWriter::new(File::create_new(begun)?),
+            file: BufWriter::new(begun),
             hash: hasher(path),
             path: path.to_owned(),
         })
@@ -58,9 +62,10 @@ impl Sealed {
             .into_inner()
             .map_err(io::IntoInnerError::into_error)?;
         if sync {
-            file.sync_all()?;
+            file.as_file().sync_all()?;
         }
-        std::fs::rename(self.path.with_extension("new"), &self.path)
+        file.persist(&self.path)?;
+        Ok(())
     }
 }
 
@@ -317,13 +322,33 @@ mod tests {
     }
 
     #[test]
+    fn two_attempts_that_write_the_same_file_leave_it_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("frame-3");
+        // The successor begins while the one that is given up still writes, and each ends as if it were alone.
+        let mut given_up = Sealed::create(&path).unwrap();
+        given_up.write_all(b"half of").unwrap();
+        let mut successor = Sealed::create(&path).unwrap();
+        successor.write_all(b"half").unwrap();
+        given_up.write_all(b" a frame").unwrap();
+        given_up.close(true).unwrap();
+        assert_eq!(read_sealed(&path).unwrap(), b"half of a frame");
+        successor.write_all(b" of a frame").unwrap();
+        successor.close(true).unwrap();
+        assert_eq!(read_sealed(&path).unwrap(), b"half of a frame");
+        // One that is killed in between takes nothing with it.
+        drop(Sealed::create(&path).unwrap());
+        assert_eq!(read_sealed(&path).unwrap(), b"half of a frame");
+        let left = std::fs::read_dir(folder.path()).unwrap().count();
+        assert_eq!(left, 1, "what was only begun is gone");
+    }
+
+    #[test]
     fn a_pipe_in_the_place_of_a_file_is_no_file_and_is_written_over() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("frame-0");
-        for pipe in [path.clone(), path.with_extension("new")] {
-            let made = std::process::Command::new("mkfifo").arg(&pipe).status();
-            assert!(made.unwrap().success());
-        }
+        let made = std::process::Command::new("mkfifo").arg(&path).status();
+        assert!(made.unwrap().success());
         assert!(read_sealed(&path).is_none());
         assert!(open(&path).is_err());
         let mut file = Sealed::create(&path).unwrap();
