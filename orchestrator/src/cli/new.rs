@@ -19,14 +19,17 @@ use template::Language;
 /// [`exit::USAGE`] when the name is none or is taken, the folder is there already, there is no such template, or, for Rust, Plyflow's crates
 /// are not to be found.
 pub fn new(args: &NewArgs) -> Done {
+    let wrong = |text: String| Stop::new(exit::USAGE, text);
+    if let Some(text) = name::malformed(&args.name) {
+        return Err(wrong(text));
+    }
     let language = {
         // Given back at once: whether a stranger's library may be loaded is asked there too.
         let mut answers = std::io::stdin().lock();
         let terminal = answers.is_terminal() && std::io::stderr().is_terminal();
         language(args, terminal.then_some(&mut answers))?
     };
-    let wrong = |text: String| Stop::new(exit::USAGE, text);
-    if let Some(text) = name::refused(&args.name, language, &template::crates(args.kind)) {
+    if let Some(text) = name::reserved(&args.name, language, &template::crates(args.kind)) {
         return Err(wrong(text));
     }
     if let Some(text) = taken(&args.name)? {

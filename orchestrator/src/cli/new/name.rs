@@ -8,24 +8,29 @@ const MOST: usize = 64;
 /// What a name has to be, for messages.
 const EXPECTED: &str = "expected small letters and digits, with single hyphens between words, beginning with a letter, such as `count-sheared`";
 
-/// Why a plugin may not be named so; `None`: it may.
-pub fn refused(name: &str, language: Language, crates: &[&str]) -> Option<String> {
+/// Why a text is no name of a plugin; `None`: it is one.
+pub fn malformed(name: &str) -> Option<String> {
     if name.len() > MOST {
         return Some(format!(
             "the name has {} letters; expected at most {MOST}",
             name.chars().count()
         ));
     }
-    if !is_kebab(name) {
-        let nearest = kebab(name);
-        let meant = match is_kebab(&nearest) && nearest.len() <= MOST {
-            true => format!("; `{nearest}` is such a name"),
-            false => String::new(),
-        };
-        return Some(format!(
-            "`{name}` is no name of a plugin: {EXPECTED}{meant}"
-        ));
+    if is_kebab(name) {
+        return None;
     }
+    let nearest = kebab(name);
+    let meant = match is_kebab(&nearest) && nearest.len() <= MOST {
+        true => format!("; `{nearest}` is such a name"),
+        false => String::new(),
+    };
+    Some(format!(
+        "`{name}` is no name of a plugin: {EXPECTED}{meant}"
+    ))
+}
+
+/// Why a plugin in this language may not have a name; `None`: it may. `crates`: those that one in Rust is built of.
+pub fn reserved(name: &str, language: Language, crates: &[&str]) -> Option<String> {
     let word = name.replace('-', "_");
     let taken = match language {
         Language::Rust if crates.contains(&name) || crates.contains(&word.as_str()) => {
@@ -105,7 +110,7 @@ mod tests {
     #[test]
     fn a_name_is_small_words_with_hyphens_and_another_one_is_told_how_it_would_be_right() {
         for name in ["a", "m4x", "count-sheared", "x2-3d"] {
-            assert_eq!(refused(name, Language::C, &[]), None, "{name}");
+            assert_eq!(malformed(name), None, "{name}");
         }
         for (name, nearest) in [
             ("CountSheared", Some("count-sheared")),
@@ -119,7 +124,7 @@ mod tests {
             ("", None),
             ("größe", Some("gr-e")),
         ] {
-            let text = refused(name, Language::C, &[]).expect(name);
+            let text = malformed(name).expect(name);
             assert!(text.contains("such as `count-sheared`"), "{text}");
             let told = text
                 .split_once("beginning with a letter, such as `count-sheared`")
@@ -128,8 +133,8 @@ mod tests {
             let expected = nearest.map_or(String::new(), |n| format!("; `{n}` is such a name"));
             assert_eq!(told, expected, "{name}");
         }
-        assert_eq!(refused(&"a".repeat(64), Language::C, &[]), None);
-        let text = refused(&"a".repeat(65), Language::C, &[]).unwrap();
+        assert_eq!(malformed(&"a".repeat(64)), None);
+        let text = malformed(&"a".repeat(65)).unwrap();
         assert!(text.contains("65 letters"), "{text}");
     }
 
@@ -148,10 +153,10 @@ mod tests {
             ("numpy", Language::Python),
             ("py-compile", Language::Python),
         ] {
-            let text = refused(name, language, &crates).expect(name);
+            let text = reserved(name, language, &crates).expect(name);
             assert!(text.ends_with(&format!("`my-{name}`")), "{text}");
-            assert_eq!(refused(name, Language::C, &crates), None, "{name}");
-            assert_eq!(refused(&format!("my-{name}"), language, &crates), None);
+            assert_eq!(reserved(name, Language::C, &crates), None, "{name}");
+            assert_eq!(reserved(&format!("my-{name}"), language, &crates), None);
         }
     }
 }
