@@ -66,10 +66,10 @@ fuzz: ## put readers of files under inputs that coverage leads; an hour, or make
 hard-cases: build ## run what is made to break elements, laws and contacts, and write docs/hard-cases.md
 	scripts/hard-cases
 
-templates: build ## build, check and run the element templates outside of the repository
+templates: build ## make a folder of each template of a plugin outside of the repository, and build, check and run it
 	scripts/check-templates
 
-wheel: build ## pack dist/plyflow-*.whl: program, plugins, header, templates, workflows, and the package for Python
+wheel: build ## pack dist/plyflow-*.whl: program, plugins, header, templates, crates, workflows, and the package for Python
 	@scripts/setup wheel
 	. ./.tools/env && .tools/venv/bin/python scripts/make-wheel dist
 

@@ -80,10 +80,10 @@ def workflows_folder() -> Path:
 
 
 def templates_folder() -> Path:
-    """The folder of the templates of steps, elements and materials in C, Rust and Python.
+    """The folder of the templates in C, Rust and Python, as they lie in the source. ``plyflow new`` makes a folder of one that builds where it is.
 
-    >>> sorted(p.name for p in templates_folder().iterdir())
-    ['element', 'element-c', 'material-python', 'step-c']
+    >>> {"element-c", "material-c", "step-c"} <= {p.name for p in templates_folder().iterdir()}
+    True
     """
     return _folder("share/plyflow/templates", "solver-plugins/door/templates", "templates")
 

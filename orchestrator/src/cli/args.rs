@@ -1,9 +1,11 @@
 //! The words of the command line.
 
 mod cluster;
+mod new;
 mod trust;
 
 pub use cluster::{ClusterArgs, PilotArgs};
+pub use new::{NewArgs, NewKind};
 pub use trust::TrustArgs;
 
 use crate::exit;
@@ -66,6 +68,9 @@ pub enum Command {
         after_help = "Examples:\n  plyflow plugins\n  plyflow plugins forming-explicit\n  plyflow plugins --trust ./build/libmine.so"
     )]
     Plugins(PluginsArgs),
+    /// Begin a plugin of your own: a folder that builds, is checked and runs at once
+    #[command(after_help = new::NEW_EXAMPLES)]
+    New(NewArgs),
     /// Keep the list of libraries, besides Plyflow's own, that you let it load
     #[command(after_help = TRUST_EXAMPLES)]
     Trust(TrustArgs),

@@ -14,6 +14,7 @@ mod front;
 mod inspect;
 mod keys;
 mod machine;
+mod new;
 mod on;
 mod open;
 mod plan;
@@ -104,6 +105,7 @@ fn dispatch(command: Command) -> Done {
         Command::Results(a) => results::results(&a),
         Command::Report(a) => report::report(&a),
         Command::Plugins(a) => plugins::plugins(&a),
+        Command::New(a) => new::new(&a),
         Command::Trust(a) => trust::command(&a),
         Command::CheckPlugin(a) => check_plugin::check_plugin(&a),
         Command::Inspect(a) => inspect::inspect(&a),

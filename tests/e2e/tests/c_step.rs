@@ -43,7 +43,7 @@ fn a_changed_library_runs_its_step_and_what_depends_on_it() {
     build(&study, |source| source);
     assert_eq!(study.run(&[]), well(3, 0));
     build(&study, |source| {
-        source.replace("time[i] *= 2;", "time[i] *= 3;")
+        source.replace("time[i] *= factor;", "time[i] *= 1.5 * factor;")
     });
     let explained = String::from_utf8(study.call(&["explain", "twice"]).stdout).unwrap();
     assert!(explained.contains("plugin"), "{explained}");

@@ -42,7 +42,7 @@ fn a_step_in_c_runs_when_built_with_only_the_header() {
         },
         components: vec![],
         search_path: vec![],
-        parameters: json!({}),
+        parameters: json!({"factor": 2.0}),
         inputs: vec![JobInput {
             port: "formed".into(),
             step: "coarse".into(),
@@ -82,5 +82,5 @@ fn a_step_in_c_runs_when_built_with_only_the_header() {
         a.array_f64("history/time").unwrap(),
         (vec![1.0, 2.0, 4.0], vec![3])
     );
-    assert_eq!(a.attributes(), r#"{"doubled": true}"#);
+    assert_eq!(a.attributes(), r#"{"count": 3}"#);
 }

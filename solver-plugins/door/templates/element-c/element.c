@@ -21,7 +21,7 @@
 /* Documented in schemas/manifest.md. */
 static const char MANIFEST[] =
     "{"
-    "\"name\": \"my-membrane-c\", \"version\": \"0.1.0\", \"vendor\": \"You\","
+    "\"name\": \"my-membrane\", \"version\": \"0.1.0\", \"vendor\": \"You\","
     "\"kind\": \"element\", \"role\": \"element\","
     "\"summary\": \"Four-node membrane with one point and hourglass control, in C.\","
     "\"parameters\": {"

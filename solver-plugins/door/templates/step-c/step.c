@@ -1,7 +1,7 @@
-/* A step plugin in C: only plyflow.h is needed.
+/* A step of Plyflow in C: only plyflow.h is needed.
  *
- * It doubles the array "history/time" of its input, writes the sum as a result and says what it did. Take
- * it as a start: change the manifest, then `run`. */
+ * It multiplies the array "history/time" of its input, writes it with how many values it has, and reports their sum. Take it as a
+ * start: change the manifest, then `run`. */
 
 #include "plyflow.h"
 
@@ -12,16 +12,16 @@
 /* A text constant as pf_str. */
 #define TEXT(s) ((pf_str){(s), sizeof(s) - 1})
 
-/* Documented in schemas/manifest.md. */
+/* Its keys are those of schemas/manifest.md. */
 static const char MANIFEST[] =
     "{"
     "\"name\": \"double-time\", \"version\": \"0.1.0\", \"vendor\": \"You\","
     "\"kind\": \"step\", \"role\": \"example\","
-    "\"summary\": \"Doubles the times of a history.\","
-    "\"parameters\": {},"
+    "\"summary\": \"Multiplies the times of a history.\","
+    "\"parameters\": {\"factor\": {\"type\": \"number\", \"default\": 2.0, \"doc\": \"What the times are multiplied by.\"}},"
     "\"inputs\": {\"formed\": {\"kind\": \"forming\", \"doc\": \"An artifact with history/time.\"}},"
     "\"output\": {\"kind\": \"example\"},"
-    "\"results\": {\"sum\": {\"unit\": \"s\", \"doc\": \"Sum of the doubled times.\"}}"
+    "\"results\": {\"sum\": {\"unit\": \"s\", \"doc\": \"Sum of the multiplied times.\"}}"
     "}";
 
 /* Tells the user why the step failed and returns the status for it. */
@@ -30,9 +30,29 @@ static int32_t failed(const pf_services *s, const char *text) {
   return PF_ERROR;
 }
 
+/* The number after a key of the parameters; false when there is none. pf_str has no NUL at its end, so copy before searching.
+ * A plugin with more than a number or two wants a JSON library here. */
+static int number(pf_str parameters, const char *key, double *value) {
+  char text[256];
+  if (parameters.len >= sizeof text)
+    return 0;
+  memcpy(text, parameters.data, parameters.len);
+  text[parameters.len] = 0;
+  const char *at = strstr(text, key);
+  const char *colon = at ? strchr(at, ':') : NULL;
+  if (colon)
+    *value = strtod(colon + 1, NULL);
+  return colon != NULL;
+}
+
 static int32_t run(const pf_services *s) {
-  /* The workflow decides which artifacts arrive; this plugin has one port that takes one artifact,
-   * so its handle is 0. s->inputs(s->host) lists them in JSON, s->parameters(s->host) the `with` block. */
+  /* The `with` block in JSON, as the manifest declares it: checked, defaults filled in, SI numbers. {"factor": 2.0} */
+  double factor;
+  if (!number(s->parameters(s->host), "\"factor\"", &factor))
+    return failed(s, "factor: expected a number within 255 bytes of parameters");
+
+  /* The workflow decides which artifacts arrive. This plugin has one port that takes one artifact, so its handle is 0.
+   * s->inputs(s->host) lists them in JSON. */
   const uint32_t formed = 0;
   const pf_str path = TEXT("history/time");
   pf_array_info info;
@@ -54,19 +74,21 @@ static int32_t run(const pf_services *s) {
       code = PF_CANCELLED;
       break;
     }
-    time[i] *= 2;
+    time[i] *= factor;
     sum += time[i];
   }
 
   char text[64];
-  snprintf(text, sizeof text, "doubled %llu times", (unsigned long long)count);
   if (code == PF_OK) {
+    snprintf(text, sizeof text, "multiplied %llu times", (unsigned long long)count);
     s->log(s->host, PF_LOG_INFO, (pf_str){text, strlen(text)});
     info.dtype = PF_F64;
     code = s->array_write(s->host, path, &info, TEXT("s"), time);
   }
-  if (code == PF_OK)
-    code = s->attributes_write(s->host, TEXT("{\"doubled\": true}"));
+  if (code == PF_OK) {
+    snprintf(text, sizeof text, "{\"count\": %llu}", (unsigned long long)count);
+    code = s->attributes_write(s->host, (pf_str){text, strlen(text)});
+  }
   if (code == PF_OK)
     code = s->result(s->host, TEXT("sum"), sum, TEXT("s"), 0);
   free(time);

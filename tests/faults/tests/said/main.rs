@@ -275,6 +275,31 @@ fn errors_of_a_command_line() {
 }
 
 #[test]
+fn new_plugins() {
+    let place = Place::new(FAN_OUT);
+    let new = |snapshot: &str, words: &[&str]| {
+        place.says(snapshot, &[&["new"], words].concat());
+    };
+    new("new-step", &["step", "count-sheared", "--c"]);
+    new("new-again", &["step", "count-sheared", "--python"]);
+    new(
+        "new-element",
+        &["element", "my-element", "--c", "--into", "a place"],
+    );
+    new("new-material", &["material", "my-law", "--rust"]);
+    new("new-bad-name", &["step", "My_Step", "--c"]);
+    new("new-taken", &["step", "trivial", "--c"]);
+    new("new-python-module", &["step", "statistics", "--python"]);
+    new("new-without-language", &["step", "mine"]);
+    new("new-without-template", &["element", "mine", "--python"]);
+    new("new-two-languages", &["step", "mine", "--c", "--rust"]);
+    new(
+        "new-without-crates",
+        &["step", "mine", "--rust", "--source", "."],
+    );
+}
+
+#[test]
 fn a_damaged_store() {
     let place = Place::new(FAN_OUT);
     place.run(0);

@@ -32,7 +32,7 @@ type Vector = [f64; 3];
 
 /// Parameters as the manifest declares them: checked by the host, defaults filled in, SI numbers.
 #[derive(serde::Deserialize)]
-struct MyMembrane {
+struct Membrane {
     /// N/m
     hourglass: f64,
 }
@@ -84,7 +84,7 @@ fn axes(d13: Vector, d24: Vector, c: &[f64], lanes: usize, l: usize) -> [Vector;
     ]
 }
 
-impl Element for MyMembrane {
+impl Element for Membrane {
     const MANIFEST: &'static str = include_str!("../manifest.json");
 
     fn create(parameters: &str, _material: &MaterialRef) -> Result<Self, String> {
@@ -211,4 +211,4 @@ impl Element for MyMembrane {
     }
 }
 
-export_element!(MyMembrane);
+export_element!(Membrane);
