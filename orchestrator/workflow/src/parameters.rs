@@ -11,6 +11,7 @@ use camino::{Utf8Component, Utf8Path, Utf8PathBuf};
 use indexmap::IndexMap;
 use plyflow_files::open::{self, FileError};
 use plyflow_files::text::shown;
+use plyflow_model::given::AskedFor;
 use plyflow_model::manifest::{Bounds, Declaration, Items, PluginKind, Shape, Unfit};
 use serde_json::{Map, Value, json};
 use std::rc::Rc;
@@ -27,6 +28,8 @@ pub(crate) struct Resolver<'a> {
     pub material_plugins: Vec<(String, Source, String)>,
     /// Files met so far.
     pub files: Vec<InputFile>,
+    /// What scenes ask other steps for: where, and what.
+    pub asked: Vec<(Source, Span, AskedFor)>,
 }
 
 /// Where a value is: its file, its JSON pointer in the step's parameters, its name for messages, and the
@@ -75,6 +78,7 @@ impl<'a> Resolver<'a> {
             components: Vec::new(),
             material_plugins: Vec::new(),
             files: Vec::new(),
+            asked: Vec::new(),
         }
     }
 
