@@ -21,6 +21,10 @@ from shapely.validation import explain_validity
 CURVES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE", "LWPOLYLINE", "POLYLINE")
 # Most corners of a contour that a scene takes.
 MOST_CORNERS = 5000
+# Points nearer to each other than this (m) are one.
+SAME = 1e-9
+# $INSUNITS -> one unit (m), exactly; what is not here is asked of ezdxf, whose factors are rounded.
+UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 8: 2.54e-8, 9: 2.54e-5, 10: 0.9144, 13: 1e-6, 14: 0.1}
 # Blocks may hold blocks; one that holds itself would never end.
 DEEPEST = 32
 
@@ -108,7 +112,7 @@ def _open(path: Path) -> "ezdxf.document.Drawing":
 
 def _unit(path: Path, document: "ezdxf.document.Drawing", given: Optional[float], notes: List[str]) -> float:
     code = int(document.header.get("$INSUNITS", 0))
-    told = None if code == 0 else float(dxf_units.conversion_factor(code, dxf_units.M))
+    told = None if code == 0 else UNITS.get(code) or float(dxf_units.conversion_factor(code, dxf_units.M))
     if given is not None:
         if told is not None and abs(told - given) > 1e-9 * given:
             notes.append(f"{path.name}: its $INSUNITS ({code}) says that one unit is {told:g} m; `unit` says {given:g} m, which counts")
@@ -156,7 +160,7 @@ def _curves(path: Path, document: "ezdxf.document.Drawing", metres: float, chord
                 f"{path}: {_name(entity)} on layer {entity.dxf.layer!r} is not flat: its z spans {1e3 * height:.4g} mm; expected a drawing in the x-y plane"
             )
         flat = _distinct(metres * points[:, :2])
-        if closed and len(flat) > 1 and (flat[0] == flat[-1]).all():
+        if closed and len(flat) > 1 and np.linalg.norm(flat[0] - flat[-1]) <= SAME:
             flat = flat[:-1]
         if len(flat) > 1:
             by_layer.setdefault(entity.dxf.layer, []).append(_Curve(flat, closed, _name(entity)))
@@ -205,10 +209,10 @@ def _array(points: Iterable) -> np.ndarray:
 
 
 def _distinct(points: np.ndarray) -> np.ndarray:
-    """Without points that repeat the one before, to a nanometre."""
+    """Without points that repeat the one before."""
     if len(points) < 2:
         return points
-    apart = np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-9
+    apart = np.linalg.norm(np.diff(points, axis=0), axis=1) > SAME
     return points[np.concatenate([[True], apart])]
 
 
@@ -315,7 +319,7 @@ def _nested(path: Path, layer: str, contours: List[_Curve]) -> Outline:
     polygons = []
     for contour in contours:
         polygon = shapely.Polygon(contour.points) if len(contour.points) > 2 else None
-        if polygon is None or polygon.area <= 0.0:
+        if polygon is None or polygon.convex_hull.area <= 0.0:
             raise DrawingError(f"{where}: the contour with {contour.name} at {_at(contour.points[0])} has no area; remove it or draw it again")
         if not polygon.is_valid:
             raise DrawingError(f"{where}: the contour with {contour.name} crosses or touches itself {_reason(polygon)}; draw it again without")

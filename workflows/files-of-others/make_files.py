@@ -31,6 +31,11 @@ def hat() -> None:
         top = [tag for _, tag in gmsh.model.getBoundary(_faces_at(HEIGHT), oriented=False)]
         occ.fillet([1], top, [RADIUS])
         occ.synchronize()
+        # The wires that it was made of are no part of it.
+        for dim in (1, 0):
+            loose = [e for e in gmsh.model.getEntities(dim) if not len(gmsh.model.getAdjacencies(*e)[0])]
+            occ.remove(loose)
+            occ.synchronize()
         gmsh.write(str(HERE / "hat.step"))
     finally:
         gmsh.finalize()

@@ -146,15 +146,17 @@ def _meshed(path: Path, unit: float, wanted: Optional[Sequence[int]]) -> Surface
         except Exception as error:
             raise StepFileError(f"{path}: its solids cannot be made one: {_said(error)}; unite them in the CAD program, or name some by `solids`") from None
         solids = [s for s in solids if s[0] == 3]
-    faces = _faces(solids)
+    faces = sorted({abs(tag) for _, tag in gmsh.model.getBoundary(solids, combined=False)} if solids else {tag for _, tag in gmsh.model.getEntities(2)})
     try:
         gmsh.model.mesh.generate(2)
     except Exception as error:
         raise StepFileError(f"{path}: gmsh cannot mesh it: {_said(error)}; take another `size`, or repair the part in the CAD program") from None
     points, triangles, chord = _triangles(path, faces)
+    triangles, skins = _outwards(points, triangles)
+    if solids and skins > len(solids):
+        raise StepFileError(f"{path}: {_count(len(solids), 'solid')} with {skins} skins: a cavity lies inside of one; fill it in the CAD program, as no sheet gets there")
     if not solids:
-        triangles = _outwards(path, points, triangles)
-        notes.append(f"{path.name}: it has faces and no solid; their outside was taken to be where they do not close around, seen from the foot")
+        notes.append(f"{path.name}: it has faces and no solid; their outside was taken to be that away from the middle of their foot")
     edges, heights = _measures(points, triangles)
     return Surface(
         points * MILLIMETRE, triangles, unit, len(solids), len(faces), chord * MILLIMETRE, float(edges.min()) * MILLIMETRE, float(heights.min()) * MILLIMETRE, notes
@@ -185,32 +187,20 @@ def _wanted(path: Path, solids: List[Tuple[int, int]], wanted: Optional[Sequence
     return chosen
 
 
-def _faces(solids: List[Tuple[int, int]]) -> Dict[int, bool]:
-    """The faces that count, and whether their triangles are to be turned round."""
-    if not solids:
-        return {tag: False for _, tag in gmsh.model.getEntities(2)}
-    # Of each solid by itself, so that a face between two would be seen twice.
-    faces: Dict[int, bool] = {}
-    for solid in solids:
-        for _, tag in gmsh.model.getBoundary([solid], combined=False, oriented=True):
-            faces[abs(tag)] = tag < 0
-    return faces
-
-
-def _triangles(path: Path, faces: Dict[int, bool]) -> Tuple[np.ndarray, np.ndarray, float]:
+def _triangles(path: Path, faces: List[int]) -> Tuple[np.ndarray, np.ndarray, float]:
     """Points (mm), triangles, and how far these lie off their faces (mm)."""
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     place = np.zeros(int(tags.max()) + 1 if len(tags) else 1, dtype=np.int64)
     place[tags.astype(np.int64)] = np.arange(len(tags))
     points = coordinates.reshape(-1, 3)
     parts, chord = [], 0.0
-    for face, turned in sorted(faces.items()):
+    for face in faces:
         _, nodes = gmsh.model.mesh.getElementsByType(2, tag=face)
         if len(nodes) == 0:
             raise StepFileError(f"{path}: gmsh made no triangle on face {face}; take a smaller `size`, or repair the face in the CAD program")
         cells = place[nodes.astype(np.int64)].reshape(-1, 3)
         chord = max(chord, _off(points[cells], face))
-        parts.append(cells[:, ::-1] if turned else cells)
+        parts.append(cells)
     triangles = np.concatenate(parts)
     used, inverse = np.unique(triangles, return_inverse=True)
     return points[used], inverse.reshape(-1, 3).astype(np.uint32), chord
@@ -231,8 +221,9 @@ def _measures(points: np.ndarray, triangles: np.ndarray) -> Tuple[np.ndarray, np
     return edges, area / edges.max(axis=1)
 
 
-def _outwards(path: Path, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Triangles of faces without a solid, wound alike, with the outside outside."""
+def _outwards(points: np.ndarray, triangles: np.ndarray) -> Tuple[np.ndarray, int]:
+    """Triangles that are wound alike, with the outside outside, and how many skins they are: triangles that share sides. How a face is wound is left to
+    chance by the files of some programs."""
     triangles = triangles.astype(np.int64)
     by_side: Dict[Tuple[int, int], List[int]] = {}
     for t, corners in enumerate(triangles.tolist()):
@@ -266,4 +257,4 @@ def _outwards(path: Path, points: np.ndarray, triangles: np.ndarray) -> np.ndarr
     for one in range(count):
         if volumes[group == one].sum() < 0.0:
             triangles[group == one] = triangles[group == one][:, ::-1]
-    return triangles.astype(np.uint32)
+    return triangles.astype(np.uint32), count

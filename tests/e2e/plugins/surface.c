@@ -80,7 +80,7 @@ static int32_t run(const pf_services *s) {
   if (code == PF_OK)
     code = outline(s, TEXT("outlines/blank/outline"), blank, 4);
   if (code == PF_OK)
-    code = outline(s, TEXT("outlines/blank/holes/0"), hole, 4);
+    code = outline(s, TEXT("outlines/blank/hole_0"), hole, 4);
   if (code == PF_OK)
     code = s->attributes_write(s->host, TEXT("{\"outlines\": [\"blank\"]}"));
   free(points);

@@ -66,7 +66,7 @@ steps:{step}
     plugin: forming-explicit{only}
     with: {{scene: scene.yaml, element: m4, element_size: 20 mm, frames: 20, tool_grid: 5 mm}}
   defects: {{plugin: defect-detection, from: {{formed: coarse}}, with: {{distance_threshold: 20 mm}}}}
-  zones: {{plugin: zone-extraction, from: {{defects: defects}}, with: {{boxes: [[-60 mm, -50 mm, 0 mm, 50 mm]]}}}}
+  zones: {{plugin: zone-extraction, from: {{defects: defects}}, with: {{boxes: [[-50 mm, -40 mm, -28 mm, 40 mm]]}}}}
   boundary:
     plugin: boundary-interpolation
     for_each: {{zone: zones}}
@@ -166,7 +166,7 @@ fn what_a_scene_asks_for_and_nothing_gives_is_told_by_the_plan_at_its_word() {
     let study = study(&chain([LIBRARY, "", ""]), &MADE);
     let plan = told(&study, "plan");
     for says in [
-        "scene.yaml:4:21",
+        "scene.yaml:4:22",
         "the body `hat` is to come from another step, and step `net` does not wire its input `geometry`",
         "`from: {geometry: <step that gives `geometry`>}`",
         "the outline `blank` is to come from another step, and step `local`",

@@ -181,7 +181,7 @@ impl Geometry for All<'_> {
 
     fn outline(&self, name: &str) -> Result<GivenOutline, String> {
         let given = self.holder(&AskedFor::Outline(name.into()))?;
-        let hole = |i: usize| format!("outlines/{name}/holes/{i}");
+        let hole = |i: usize| format!("outlines/{name}/hole_{i}");
         let there = |i: &usize| self.host.array_info(given.input, &hole(*i)).is_some();
         let holes = (0..MOST_HOLES).take_while(there);
         Ok(GivenOutline {
