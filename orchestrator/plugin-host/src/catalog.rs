@@ -1,9 +1,13 @@
 //! The plugins on a search path.
 
+mod files;
 mod gate;
 mod known;
+mod made;
+mod python;
 
 pub use known::{Describer, PluginCatalog};
+pub use python::Python;
 
 use crate::breach::{Breach, ComponentError};
 use crate::load::Plugin;
@@ -16,6 +20,9 @@ use plyflow_workflow::{Catalog, CatalogEntry, CatalogError};
 
 /// Ending of a library's file name.
 const SUFFIX: &str = ".so";
+
+/// Beginning of the names of libraries that carry what is written in Python: with nothing to carry they are no plugins.
+pub const CARRIERS: &str = "libplyflow_python_";
 
 impl PluginCatalog {
     /// All plugins on the search path, in its order; of two of a name only the first.
@@ -52,12 +59,23 @@ impl PluginCatalog {
         self.scan().iter().filter_map(broken).collect()
     }
 
+    /// Plugins in Python of a folder.
+    fn in_python(&self, folder: &Utf8Path) -> Vec<Utf8PathBuf> {
+        let mut paths = match self.python {
+            Some(_) => files(folder, python::SUFFIX),
+            None => Vec::new(),
+        };
+        paths.retain(|p| python::is_marked(p));
+        paths
+    }
+
     fn scan(&self) -> &[Found] {
         self.scanned.get_or_init(|| {
             let mut found = Vec::new();
             let libraries = self.folders.iter().flat_map(|folder| {
                 let place = self.trust.place(&folder.join("lib.so"));
-                libraries(folder).into_iter().map(move |path| (path, place))
+                let files = libraries(folder).into_iter().chain(self.in_python(folder));
+                files.map(move |path| (path, place))
             });
             for (path, place) in libraries {
                 match self.look(&path, place, false) {
@@ -156,7 +174,7 @@ impl Catalog for PluginCatalog {
             let Ok(path) = path.canonicalize_utf8() else {
                 return Err(not_found(vec![path]));
             };
-            let place = self.trust.place(&path);
+            let place = self.place(&path);
             let found = self.look(&path, place, true);
             self.save();
             return match found {
@@ -190,7 +208,7 @@ impl Catalog for PluginCatalog {
 
 /// Whether a plugin is named by its path.
 fn is_path(name: &str) -> bool {
-    name.contains('/') || name.ends_with(SUFFIX)
+    name.contains('/') || name.ends_with(SUFFIX) || name.ends_with(python::SUFFIX)
 }
 
 /// Whether a library's file name says that it is the plugin of that name.
@@ -206,6 +224,13 @@ fn named_like(path: &Utf8Path, name: &str) -> bool {
 
 /// Library files of a folder, sorted by name; none if the folder cannot be read.
 fn libraries(folder: &Utf8Path) -> Vec<Utf8PathBuf> {
+    let mut paths = files(folder, SUFFIX);
+    paths.retain(|p| !p.file_name().is_some_and(|n| n.starts_with(CARRIERS)));
+    paths
+}
+
+/// Files of a folder whose names end so, sorted.
+fn files(folder: &Utf8Path, suffix: &str) -> Vec<Utf8PathBuf> {
     let folder = folder
         .canonicalize_utf8()
         .unwrap_or_else(|_| folder.to_owned());
@@ -215,7 +240,7 @@ fn libraries(folder: &Utf8Path) -> Vec<Utf8PathBuf> {
     let mut paths: Vec<Utf8PathBuf> = entries
         .flatten()
         .map(camino::Utf8DirEntry::into_path)
-        .filter(|p| p.as_str().ends_with(SUFFIX) && p.is_file())
+        .filter(|p| p.as_str().ends_with(suffix) && p.is_file())
         .collect();
     paths.sort();
     paths

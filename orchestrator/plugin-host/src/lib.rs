@@ -23,7 +23,7 @@ mod trust;
 mod worker;
 
 pub use breach::{Breach, LoadError};
-pub use catalog::{Describer, PluginCatalog};
+pub use catalog::{CARRIERS, Describer, PluginCatalog, Python};
 pub use checkpoints::{cost_so_far, damaged_cost};
 pub use describe::{Description, describe, describe_main};
 pub use load::Plugin;

@@ -87,11 +87,21 @@ pub fn children_seconds() -> f64 {
     cpu_seconds_of(libc::RUSAGE_CHILDREN)
 }
 
-fn cpu_seconds_of(whose: libc::c_int) -> f64 {
+/// Largest resident set of a process that this one has started and that has ended (bytes); 0 where there was none.
+pub(crate) fn children_peak_memory() -> u64 {
+    u64::try_from(usage_of(libc::RUSAGE_CHILDREN).ru_maxrss).unwrap_or(0) * 1024
+}
+
+fn usage_of(whose: libc::c_int) -> libc::rusage {
     // SAFETY: numbers alone, for which zeros are values.
     let mut usage: libc::rusage = unsafe { std::mem::zeroed() };
     // SAFETY: a whole struct of this function.
     unsafe { libc::getrusage(whose, &raw mut usage) };
+    usage
+}
+
+fn cpu_seconds_of(whose: libc::c_int) -> f64 {
+    let usage = usage_of(whose);
     let seconds = |t: libc::timeval| t.tv_sec as f64 + t.tv_usec as f64 * 1e-6;
     seconds(usage.ru_utime) + seconds(usage.ru_stime)
 }

@@ -109,8 +109,9 @@ fn run(job: &Job, emitter: &Emitter<'_>) -> Result<Record, Failure> {
 
     let cost = state.checkpoints.with_earlier(Cost {
         wall_seconds,
-        cpu_seconds: process::cpu_seconds(),
-        peak_memory: process::peak_memory(),
+        // With what it has started and waited for: a step in Python runs in a process of its own.
+        cpu_seconds: process::cpu_seconds() + process::children_seconds(),
+        peak_memory: process::peak_memory().max(process::children_peak_memory()),
         threads: job.threads.max(1),
     });
     let mut output = state.output();

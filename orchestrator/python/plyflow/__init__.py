@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
 if TYPE_CHECKING:
+    from . import declare
     from ._ask import PathLike
     from ._installation import include_folder, material, program, templates_folder, workflows_folder
     from .artifact import Artifact, Body, FieldInfo, Number, Values
@@ -24,14 +25,16 @@ if TYPE_CHECKING:
     from .errors import Damaged, Finding, InvalidInput, Locked, MissingPackage, NotFound, PlyflowError, RunFailed, Stopped
     from .running import Event, run
     from .runs import Run, Step, Store
+    from .steps import Cancelled, Refused, StepRun, step
     from .study import Study
 
     __version__: str
 
 __all__ = [
-    "Artifact", "Body", "Damaged", "Event", "FieldInfo", "Finding", "InvalidInput", "Locked", "Material", "MissingPackage", "NotFound", "Number",
-    "PlyflowError", "Run", "RunFailed", "Scene", "Step", "Stopped", "Store", "Study", "Values", "Workflow", "__version__", "diaphragm",
-    "include_folder", "material", "open", "ply", "program", "run", "schema", "templates_folder", "workflows_folder",
+    "Artifact", "Body", "Cancelled", "Damaged", "Event", "FieldInfo", "Finding", "InvalidInput", "Locked", "Material", "MissingPackage", "NotFound", "Number",
+    "PlyflowError", "Refused", "Run", "RunFailed", "Scene", "Step", "StepRun", "Stopped", "Store", "Study", "Values", "Workflow", "__version__",
+    "declare", "diaphragm", "include_folder", "material", "open", "ply", "program", "run", "schema", "step", "templates_folder",
+    "workflows_folder",
 ]  # fmt: skip
 
 # In which module each name is. It is imported when the name is used: the command `plyflow` must not wait for numpy.
@@ -42,6 +45,7 @@ _MODULES = {
     "errors": ("Damaged", "Finding", "InvalidInput", "Locked", "MissingPackage", "NotFound", "PlyflowError", "RunFailed", "Stopped"),
     "running": ("Event", "run"),
     "runs": ("Run", "Step", "Store"),
+    "steps": ("Cancelled", "Refused", "StepRun", "step"),
     "study": ("Study",),
 }
 
@@ -49,6 +53,10 @@ _MODULES = {
 def __getattr__(name: str) -> Any:
     if name == "__version__":
         return _version()
+    if name == "declare":
+        from importlib import import_module
+
+        return import_module(f"{__name__}.declare")
     for module, names in _MODULES.items():
         if name in names:
             from importlib import import_module

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import importlib
 import json
+import os
 import subprocess
 from pathlib import Path
 from typing import Any, Mapping, Sequence, Union
 
-from ._installation import program
+from ._installation import environment, program
 from .errors import Damaged, Finding, InvalidInput, Locked, MissingPackage, NotFound, PlyflowError, Stopped
 
 Settings = Mapping[str, Any]
@@ -49,7 +50,8 @@ def ask(words: Sequence[PathLike], allowed: Sequence[int] = (0,), silent: bool =
     Raises:
         PlyflowError: of the class that the exit code stands for, with what the program said.
     """
-    done = subprocess.run([str(program()), *map(str, words)], stdin=subprocess.DEVNULL, capture_output=True, check=False)
+    command = [str(program()), *map(str, words)]
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False, env={**os.environ, **environment()})
     said = done.stderr.decode("utf-8", "replace").strip()
     if done.returncode not in allowed:
         raise error_of(done.returncode, said)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import NoReturn
+from typing import Dict, NoReturn
 
 from .errors import NotFound, PlyflowError
 
@@ -38,6 +38,11 @@ def program() -> Path:
             return candidate
     looked = ", ".join(str(c) for c in candidates)
     raise NotFound(f"there is no program `plyflow`: looked for {looked}; install the wheel, or set PLYFLOW_PROGRAM")
+
+
+def environment() -> Dict[str, str]:
+    """What the program is told of this interpreter: plugins in Python are made and run by it, unless ``PLYFLOW_PYTHON`` names another."""
+    return {"PLYFLOW_PYTHON": os.environ.get("PLYFLOW_PYTHON") or sys.executable}
 
 
 def _folder(installed: str, source: str, what: str) -> Path:
@@ -95,6 +100,7 @@ def main() -> NoReturn:
     """The command ``plyflow``: becomes the program, with the words of this process."""
     try:
         path = program()
+        os.environ.update(environment())
         os.execv(path, [str(path), *sys.argv[1:]])
     except PlyflowError as error:
         sys.exit(f"plyflow: {error}")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import signal
+import os
 import subprocess
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Callable, Sequence
 
 from ._ask import PathLike, Settings, error_of, words_of
-from ._installation import program
+from ._installation import environment, program
 from .build import Workflow
 from .errors import Finding, InvalidInput, PlyflowError, RunFailed
 from .runs import Run
@@ -116,6 +117,7 @@ def _follow(words: Sequence[str], on_event: Callable[[Event], None] | None) -> t
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         start_new_session=True,
+        env={**os.environ, **environment()},
         text=True,
         encoding="utf-8",
         errors="replace",

@@ -18,6 +18,7 @@ mod on;
 mod open;
 mod plan;
 mod plugins;
+mod python;
 mod report;
 mod results;
 mod run;

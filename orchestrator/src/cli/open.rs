@@ -150,8 +150,10 @@ pub fn catalog(folders: Folders, places: &Places, store: &Utf8Path) -> Result<Pl
     {
         warn(&format!("plyflow: {text}\n"));
     }
+    let python = super::python::python(&program()?, &folders.installation);
     let trust = trust::trust(places, &folders.installation, folders.own)?;
-    Ok(PluginCatalog::new(folders.search, cache, describer).gated(trust))
+    let catalog = PluginCatalog::new(folders.search, cache, describer).gated(trust);
+    Ok(catalog.with_python(python))
 }
 
 /// Reads and checks a workflow; says everything that is wrong with it.

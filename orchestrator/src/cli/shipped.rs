@@ -1,15 +1,13 @@
 //! What lies beside this program: the workflows that come along.
 
 use super::open::program;
+use super::python::SOURCE_KNOWN_BY;
 use crate::exit;
 use crate::said::Stop;
 use camino::{Utf8Path, Utf8PathBuf};
 
 /// By this file a folder of shipped workflows is known.
 const KNOWN_BY: &str = "joggle-spar/workflow.yaml";
-
-/// By this file a folder above the program is known to be Plyflow's source.
-const SOURCE_KNOWN_BY: &str = "schemas/abi/plyflow.h";
 
 /// The folder of the workflows that come along: `share/plyflow/workflows` of an installation, or `workflows` of the source tree in which
 /// this program was built.

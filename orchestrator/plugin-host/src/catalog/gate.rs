@@ -1,6 +1,8 @@
 //! The gate before libraries that are not trusted: what is known of them without loading them, and what they may not take.
 
-use super::known::{Looked, PluginCatalog, is_readable, looked, read_stranger};
+use super::files::read_stranger;
+use super::known::{Looked, PluginCatalog, is_readable, looked};
+use super::python;
 use crate::breach::Breach;
 use crate::describe::Description;
 use crate::load::read_manifest;
@@ -56,8 +58,11 @@ impl PluginCatalog {
     /// # Errors
     /// [`CatalogError::NeedsConsent`], or [`CatalogError::Broken`] when it cannot be read.
     pub fn admit(&self, id: &PluginId) -> Result<(), CatalogError> {
-        if self.trust.place(&id.path) != Place::Elsewhere {
+        if self.place(&id.path) != Place::Elsewhere {
             return Ok(());
+        }
+        if let Some(answer) = self.admit_python(id) {
+            return answer;
         }
         let library = read_stranger(&id.path).map_err(|breach| CatalogError::Broken {
             path: id.path.clone(),
@@ -81,6 +86,9 @@ impl PluginCatalog {
     /// What a library is. One that may not be loaded is described by what lies beside it; `ask`: the user may be asked
     /// when nothing does.
     pub(super) fn look(&self, path: &Utf8Path, place: Place, ask: bool) -> Looked {
+        if path.as_str().ends_with(python::SUFFIX) {
+            return self.look_at_python(path, place, ask);
+        }
         match place {
             Place::Elsewhere => self.look_at_stranger(path, ask),
             Place::Installation | Place::Own => match self.known(path, None) {

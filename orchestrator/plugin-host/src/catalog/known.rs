@@ -1,9 +1,10 @@
 //! What is known of libraries: what their files and they themselves say, kept in a cache file.
 
+use super::files::{LOAD_LIMIT, LONGEST_ANSWER, Stamp, answer, read_stranger, stamp};
+use super::python::Python;
 use crate::breach::Breach;
 use crate::describe::{Description, describe};
-use crate::load::{hash_of, read_manifest};
-use crate::supervise::Orphans;
+use crate::load::read_manifest;
 use crate::trust::{Place, Stranger, Trust};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_artifact::seal::{read_document, seal, sealed};
@@ -12,18 +13,9 @@ use plyflow_workflow::CatalogEntry;
 use plyflow_workflow::resolved::PluginId;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::io::Read;
-use std::os::unix::fs::MetadataExt;
-use std::os::unix::process::{CommandExt, ExitStatusExt};
-use std::process::{Command, ExitStatus, Stdio};
+use std::os::unix::process::ExitStatusExt;
+use std::process::Command;
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
-use std::time::Duration;
-
-/// How long a library may take to load and describe itself.
-const LOAD_LIMIT: Duration = Duration::from_secs(30);
-
-/// Most bytes that a library may say of itself: what a plugin's manifest takes, many times over.
-const LONGEST_ANSWER: u64 = 16 << 20;
 
 /// Version of the cache file. 2: sealed.
 const CACHE_VERSION: u32 = 2;
@@ -41,17 +33,6 @@ pub enum Describer {
     },
     /// In this process: only for tests and for workers, which may die.
     InProcess,
-}
-
-/// What tells one version of a library file from another, without reading it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-struct Stamp {
-    size: u64,
-    modified: i64,
-    modified_ns: i64,
-    changed: i64,
-    changed_ns: i64,
-    inode: u64,
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -84,6 +65,7 @@ pub struct PluginCatalog {
     pub(super) cache: Mutex<Cache>,
     pub(super) scanned: OnceLock<Vec<Found>>,
     pub(super) trust: Trust,
+    pub(super) python: Option<Python>,
 }
 
 /// A library in a folder of the search path.
@@ -134,6 +116,7 @@ impl PluginCatalog {
             cache,
             scanned: OnceLock::new(),
             trust: Trust::everything(),
+            python: None,
         }
     }
 
@@ -145,6 +128,15 @@ impl PluginCatalog {
 
     pub(super) fn cache(&self) -> MutexGuard<'_, Cache> {
         self.cache.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What is kept of a library that is as it was.
+    pub(super) fn described(&self, path: &Utf8Path) -> Option<(String, Description)> {
+        let stamp = stamp(path).ok()?;
+        let cache = self.cache();
+        let known = cache.libraries.get(path);
+        let known = known.filter(|k| k.stamp == stamp && is_readable(&k.description))?;
+        Some((known.hash.clone(), known.description.clone()))
     }
 
     /// Hash and description of a library that may be loaded, from the cache when the file is as it was. `hash`: that of
@@ -252,64 +244,6 @@ pub(super) fn is_readable(description: &Description) -> bool {
     }
 }
 
-/// Runs a command to its end: its standard output and its status, or no status when it had to be killed after
-/// [`LOAD_LIMIT`] or [`LONGEST_ANSWER`].
-fn answer(mut command: Command) -> std::io::Result<(Vec<u8>, Option<ExitStatus>)> {
-    let mut child = command
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .process_group(0)
-        .spawn()?;
-    let mut pipe = child.stdout.take().expect("piped above");
-    let (send, receive) = std::sync::mpsc::channel();
-    // A reader of its own, because the pipe alone tells when the child has ended.
-    std::thread::spawn(move || {
-        let mut said = Vec::new();
-        let read = (&mut pipe).take(LONGEST_ANSWER).read_to_end(&mut said);
-        let whole = read.is_ok() && said.len() < LONGEST_ANSWER as usize;
-        let _ = send.send(whole.then_some(said));
-    });
-    match receive.recv_timeout(LOAD_LIMIT) {
-        Ok(Some(said)) => Ok((said, Some(child.wait()?))),
-        // One that goes on to talk is stopped as one that hangs.
-        Ok(None) | Err(_) => {
-            // What the library started goes too, also where it has left the group.
-            if let Ok(group) = libc::pid_t::try_from(child.id()) {
-                // SAFETY: numbers alone. The group of a child that has not been waited for: its number is no other's.
-                unsafe { libc::kill(-group, libc::SIGKILL) };
-            }
-            child.kill()?;
-            child.wait()?;
-            Orphans::end(&[]);
-            Ok((Vec::new(), None))
-        }
-    }
-}
-
-fn stamp(path: &Utf8Path) -> std::io::Result<Stamp> {
-    let m = std::fs::metadata(path)?;
-    Ok(Stamp {
-        size: m.size(),
-        modified: m.mtime(),
-        modified_ns: m.mtime_nsec(),
-        changed: m.ctime(),
-        changed_ns: m.ctime_nsec(),
-        inode: m.ino(),
-    })
-}
-
-/// The path and the hash of a library's bytes.
-pub(super) fn read_stranger(path: &Utf8Path) -> Result<Stranger, Breach> {
-    if !path.is_file() {
-        return Err(Breach::Missing);
-    }
-    Ok(Stranger {
-        path: path.to_owned(),
-        hash: hash_of(path)?,
-    })
-}
-
 pub(super) fn looked(path: &Utf8Path, (hash, description): (String, Description)) -> Looked {
     let text = match description {
         Description::Foreign(_) => return Looked::Foreign,
@@ -327,27 +261,4 @@ pub(super) fn looked(path: &Utf8Path, (hash, description): (String, Description)
         hash,
     };
     Looked::Plugin(Box::new(CatalogEntry { id, manifest }))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_answer_without_end_is_cut_off_and_its_command_killed() {
-        let shell = |text: &str| {
-            let mut command = Command::new("sh");
-            command.args(["-c", text]);
-            answer(command).unwrap()
-        };
-        let (said, status) = shell("echo short");
-        assert_eq!(
-            (said.as_slice(), status.and_then(|s| s.code())),
-            (&b"short\n"[..], Some(0))
-        );
-        let begun = std::time::Instant::now();
-        let (said, status) = shell("yes");
-        assert!(said.is_empty() && status.is_none());
-        assert!(begun.elapsed() < LOAD_LIMIT / 2);
-    }
 }
