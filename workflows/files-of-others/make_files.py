@@ -71,7 +71,7 @@ def blank() -> None:
     for name in ("PLY", "NOTES"):
         document.layers.add(name)
     ply = {"layer": "PLY"}
-    x, y, r, cut = 80.0, 55.0, 15.0, 20.0
+    x, y, r, cut = 118.0, 80.0, 20.0, 30.0
     space.add_line((-x + r, -y), (x - r, -y), ply)
     space.add_arc((x - r, -y + r), r, 270, 0, dxfattribs=ply)
     space.add_line((x, -y + r), (x, y - cut), ply)
@@ -80,7 +80,7 @@ def blank() -> None:
     space.add_arc((-x + r, y - r), r, 90, 180, dxfattribs=ply)
     space.add_line((-x, y - r), (-x, -y + r), ply)
     space.add_arc((-x + r, -y + r), r, 180, 270, dxfattribs=ply)
-    space.add_circle((25.0, 10.0), 12.0, dxfattribs=ply)
+    space.add_circle((40.0, 20.0), 12.0, dxfattribs=ply)
     space.add_text("PLY 1, 0 deg along x", dxfattribs={"layer": "NOTES", "insert": (-x, y + 10.0), "height": 5.0})
     document.saveas(HERE / "blank.dxf")
 

@@ -8,8 +8,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Dict, List, Optional, Sequence, Tuple
 
-import gmsh
 import numpy as np
+
+try:
+    import gmsh
+except OSError as error:
+    raise ImportError(
+        f"gmsh is installed and cannot be loaded: {error}. It needs libraries of a desktop, although it opens no window; on Debian: apt-get install "
+        "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1 libxfixes3 libxext6 libgomp1"
+    ) from None
 
 MILLIMETRE = 1e-3
 

@@ -13,7 +13,7 @@ from dxf_reading import DrawingError, read
 
 HERE = Path(__file__).resolve().parent.parent
 # Area of blank.dxf (m2): a rectangle without three round corners, one corner that is cut off and a round hole.
-BLANK = (160 * 110 - 3 * (1 - math.pi / 4) * 15**2 - 0.5 * 20**2 - math.pi * 12**2) * 1e-6
+BLANK = (236 * 160 - 3 * (1 - math.pi / 4) * 20**2 - 0.5 * 30**2 - math.pi * 12**2) * 1e-6
 
 
 def drawing(tmp_path, draw, units=4):
@@ -43,9 +43,9 @@ def test_the_blank_of_the_example_has_the_area_and_the_hole_that_were_drawn():
     # A chord of 1 um along 100 mm of arcs and the hole's 75 mm.
     assert blank.area == pytest.approx(BLANK, abs=2e-7)
     (hole,) = blank.holes
-    assert hole.mean(axis=0) == pytest.approx([0.025, 0.010], abs=1e-9)
-    assert np.hypot(*(hole - [0.025, 0.010]).T) == pytest.approx(np.full(len(hole), 0.012), abs=1e-9)
-    assert blank.outline.min(axis=0) == pytest.approx([-0.08, -0.055]) and blank.outline.max(axis=0) == pytest.approx([0.08, 0.055])
+    assert 0.5 * (hole.min(axis=0) + hole.max(axis=0)) == pytest.approx([0.040, 0.020], abs=1e-6)
+    assert np.hypot(*(hole - [0.040, 0.020]).T) == pytest.approx(np.full(len(hole), 0.012), abs=1e-9)
+    assert blank.outline.min(axis=0) == pytest.approx([-0.118, -0.08]) and blank.outline.max(axis=0) == pytest.approx([0.118, 0.08])
     assert shapely.Polygon(blank.outline).exterior.is_ccw and shapely.Polygon(hole).exterior.is_ccw
     assert found.notes == ["blank.dxf: passed over what is no curve: 1 TEXT"]
 
@@ -54,7 +54,7 @@ def test_the_blank_of_the_example_has_the_area_and_the_hole_that_were_drawn():
 def test_corners_lie_on_round_curves_and_lines_between_them_no_farther_off_than_the_chord(chord):
     (hole,) = read(HERE / "blank.dxf", {"blank": "PLY"}, chord=chord).outlines["blank"].holes
     middles = 0.5 * (hole + np.roll(hole, -1, axis=0))
-    off = 0.012 - np.hypot(*(middles - [0.025, 0.010]).T)
+    off = 0.012 - np.hypot(*(middles - [0.040, 0.020]).T)
     assert 0.2 * chord < off.max() <= chord * (1 + 1e-9)
 
 
