@@ -461,21 +461,15 @@ pub(crate) fn find(
     }: &Mention<'_>,
     kind: PluginKind,
 ) -> Option<Rc<CatalogEntry>> {
-    let article = if kind == PluginKind::Element {
-        "an"
-    } else {
-        "a"
+    let with_article = |kind: PluginKind| match kind {
+        PluginKind::Element => format!("an {kind}"),
+        _ => format!("a {kind}"),
     };
     match catalog.find(name, &source.folder) {
         Ok(entry) if entry.manifest.kind == kind => return Some(entry),
         Ok(entry) => {
-            let found = entry.manifest.kind;
-            let found = if found == PluginKind::Element {
-                format!("an {found}")
-            } else {
-                format!("a {found}")
-            };
-            let message = format!("`{name}` is {found} plugin, not {article} {kind} plugin");
+            let [found, wanted] = [entry.manifest.kind, kind].map(with_article);
+            let message = format!("`{name}` is {found} plugin, not {wanted} plugin");
             let names = catalog.names(kind);
             let d = problems.add(source, span, message);
             d.given(name)
@@ -485,7 +479,8 @@ pub(crate) fn find(
             let names = catalog.names(kind);
             let d = problems.add(source, span, e.to_string());
             d.once();
-            d.given(name).expected(format!("{article} {kind} plugin"));
+            d.given(name)
+                .expected(format!("{} plugin", with_article(kind)));
             match &e {
                 CatalogError::NotFound { searched, .. } => {
                     not_found(d, name, searched, &names, kind)
