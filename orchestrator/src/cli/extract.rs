@@ -250,22 +250,22 @@ mod tests {
 
     #[test]
     fn bytes_of_an_array_are_a_file_and_other_arrays_are_refused() {
-        use plyflow_artifact::{ArtifactWriter, Provenance};
+        use plyflow_artifact::ArtifactWriter;
         let (_keep, dir) = folder();
         let path = dir.join("a.vtkhdf");
         let mut writer = ArtifactWriter::create(path.as_std_path(), "export").unwrap();
         let all: Vec<u8> = (0..=255).collect();
         let size = [all.len() as u64];
         writer
-            .write_array("files/odd", DType::U8, &size, "", &all)
+            .array("files/odd", DType::U8, &size, "", &all)
             .unwrap();
         writer
-            .write_array("files/wide", DType::U8, &[16, 16], "", &all)
+            .array("files/wide", DType::U8, &[16, 16], "", &all)
             .unwrap();
         writer
-            .write_array("time", DType::F64, &[32], "s", &all)
+            .array("time", DType::F64, &[32], "s", &[0; 256])
             .unwrap();
-        writer.finish(&Provenance::default()).unwrap();
+        writer.finish(&serde_json::json!({})).unwrap();
         let artifact = Artifact::open(path.as_std_path()).unwrap();
         let of = |array: &str| CarriedFile {
             name: "part.bin".into(),

@@ -34,8 +34,11 @@ fn square(half: f64) -> Vec<Point> {
     vec![[-half, -half], [half, -half], [half, half], [-half, half]]
 }
 
+/// Name, corners, and corners of the holes.
+type Drawn = (&'static str, Vec<Point>, Vec<Vec<Point>>);
+
 /// The outlines of one step, and one body.
-struct Made(Vec<(&'static str, Vec<Point>, Vec<Vec<Point>>)>);
+struct Made(Vec<Drawn>);
 
 impl Geometry for Made {
     fn body(&self, name: &str) -> Result<GivenSurface, String> {
