@@ -16,6 +16,7 @@ import shapely
 from ezdxf import units as dxf_units
 from ezdxf.entities import DXFEntity
 from ezdxf.lldxf.const import DXFError
+from shapely.geometry.polygon import orient
 from shapely.validation import explain_validity
 
 CURVES = ("LINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE", "LWPOLYLINE", "POLYLINE")
@@ -323,7 +324,7 @@ def _nested(path: Path, layer: str, contours: List[_Curve]) -> Outline:
             raise DrawingError(f"{where}: the contour with {contour.name} at {_at(contour.points[0])} has no area; remove it or draw it again")
         if not polygon.is_valid:
             raise DrawingError(f"{where}: the contour with {contour.name} crosses or touches itself {_reason(polygon)}; draw it again without")
-        polygons.append(shapely.orient_polygons(polygon))
+        polygons.append(orient(polygon))
     order = sorted(range(len(polygons)), key=lambda k: -polygons[k].area)
     outer, inner = order[0], order[1:]
     for k in inner:

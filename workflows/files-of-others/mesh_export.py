@@ -13,11 +13,11 @@ import mesh_writing
     output="export",
     inputs={"formed": declare.port("any", doc="An artifact with bodies.")},
     parameters={
-        "format": declare.choice(list(mesh_writing.FORMATS), default="vtu", doc="What is written: VTU has the fields too; Abaqus and Nastran have the mesh."),
+        "format": declare.choice(list(mesh_writing.FORMATS), default="vtu", doc="What is written: `vtu` has the fields too, `abaqus` the mesh alone."),
         "bodies": declare.list_of(declare.string(doc="Name of a body."), minimum_items=1, doc="Which bodies; left out, all."),
         "frame": declare.integer(doc="Which frame, from 0; left out, the last."),
         "unit": declare.quantity(
-            "length", default="1 m", exclusive_minimum="0 mm", doc="In what the file has lengths of points: `1 mm` for most models of Abaqus and Nastran. Fields are in SI."
+            "length", default="1 m", exclusive_minimum="0 mm", doc="In what the file has lengths of points: `1 mm` for most models of Abaqus. Fields are in SI."
         ),
     },
     results={

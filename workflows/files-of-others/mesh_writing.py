@@ -14,10 +14,9 @@ import numpy as np
 FORMATS = {
     "vtu": ("vtu", "vtu"),
     "abaqus": ("inp", "abaqus"),
-    "nastran": ("bdf", "nastran"),
 }
-# Formats of meshes alone.
-WITHOUT_FIELDS = ("abaqus", "nastran")
+# Formats that hold meshes alone. meshio writes Nastran too, but fails on some numbers.
+WITHOUT_FIELDS = ("abaqus",)
 
 
 class ExportError(ValueError):
@@ -61,7 +60,7 @@ def write(mesh: Mesh, form: str, unit: float = 1.0) -> bytes:
         try:
             meshio.write(path, told, file_format=name)
         except Exception as error:
-            raise ExportError(f"meshio cannot write {form}: {error}") from None
+            raise ExportError(f"meshio cannot write {form}: {str(error) or type(error).__name__}") from None
         return path.read_bytes()
 
 

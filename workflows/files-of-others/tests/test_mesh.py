@@ -9,7 +9,7 @@ from mesh_writing import FORMATS, ExportError, Mesh, file_name, left_out, write
 
 def sheet():
     """Two quads that share a side, with values that tell each point and cell apart."""
-    points = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0.01], [0, 0.1, 0], [0.2, 0, 0], [0.2, 0.1, 0.03]])
+    points = np.array([[0, 1e-17, 0], [0.1, -4e-13, 0], [0.1, 0.1, 0.01], [0, 0.1, 0], [0.2, 0, 0], [0.2, 0.1, 0.03]])
     cells = np.array([[0, 1, 2, 3], [1, 4, 5, 2]], dtype=np.uint32)
     return Mesh(points, cells, {"contact_pressure": np.arange(6) * 1e5}, {"shear_angle": np.array([0.25, -0.125]), "axis": np.array([[1.0, 0, 0], [0, 1.0, 0]])})
 

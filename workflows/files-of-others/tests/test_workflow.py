@@ -133,6 +133,31 @@ def test_the_exported_file_is_read_by_meshio_and_by_vtk_with_the_numbers_of_the_
     assert (vtk_to_numpy(grid.GetCellData().GetArray("shear_angle")) == fields["shear_angle"]).all()
 
 
+def test_all_bodies_of_a_run_and_a_tool_without_frames_are_exported_in_the_other_formats(study, tmp_path):
+    text = (study / "workflow.yaml").read_text().replace("name: files-of-others", "name: more")
+    more = """  all:
+    plugin: ./mesh_export.py
+    from: {formed: formed}
+    with: {format: abaqus, unit: 1 mm, frame: 0}
+  skin:
+    plugin: ./mesh_export.py
+    from: {formed: tool}
+    with: {format: abaqus, unit: 1 mm}
+"""
+    (study / "workflow-more.yaml").write_text(text + more)
+    call(study, "run", "--no-report", "workflow-more.yaml")
+    for step in ("all", "skin"):
+        call(study, "extract", "workflow-more.yaml", step, "--to", str(tmp_path))
+    formed, tool = (artifact(study, "workflow-more.yaml", step) for step in ("formed", "tool"))
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["hat.inp", "lower_film.inp", "ply.inp", "tool.inp", "upper_film.inp"]
+    for name, body, of, unit in (("ply.inp", formed["ply"], "quad", 1e-3), ("tool.inp", formed["tool"], "triangle", 1e-3), ("hat.inp", tool["hat"], "triangle", 1e-3)):
+        mesh = meshio.read(tmp_path / name)
+        points = body.points_at(0) if body.is_moving else body.reference
+        assert mesh.points * unit == pytest.approx(np.asarray(points), abs=1e-9), name
+        (cells,) = mesh.cells
+        assert cells.type == of and (cells.data == body.cells).all(), name
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
