@@ -2,7 +2,7 @@
 
 use plyflow_model::material::{Material, MaterialEntry};
 use plyflow_model::rules::{self, known::Known};
-use plyflow_model::scene::{Scene, SheetKind};
+use plyflow_model::scene::{Scene, SheetKind, Tool};
 use std::path::{Path, PathBuf};
 
 fn workflows() -> PathBuf {
@@ -30,7 +30,9 @@ fn scenes() -> Vec<(PathBuf, Scene)> {
 
 #[test]
 fn every_scene_has_a_closed_tool_under_its_plies_and_materials_that_parse() {
-    let scenes = scenes();
+    // A tool that a step makes is there once that has run.
+    let is_known = |(_, scene): &(_, Scene)| !matches!(scene.tool, Tool::Input(_));
+    let scenes: Vec<(PathBuf, Scene)> = scenes().into_iter().filter(is_known).collect();
     assert!(scenes.len() >= 2, "found {} scenes", scenes.len());
     for (path, scene) in scenes {
         let folder = path.parent().unwrap();
