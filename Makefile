@@ -14,7 +14,7 @@ CARGO := . ./.tools/env && cargo
 BOOK := . ./.tools/env && CARGO_TARGET_DIR=$(TARGET)/book-builder cargo
 # What needs no HDF5, no plugin and no run: its tests take seconds once built.
 QUICK := -p plyflow-abi -p plyflow-model -p plyflow-files -p plyflow-fixed -p plyflow-study -p plyflow-sdk -p plyflow-geometry -p plyflow-surface \
-  -p plyflow-kernels -p plyflow-blank -p plyflow-conformance
+  -p plyflow-kernels -p plyflow-blank -p plyflow-conformance -p plyflow-python-law
 
 # The crates whose loops hold invariants, with these looked at. A package's own settings leave all others as they are built already.
 CHECKED := $(foreach crate,mechanics kernels,$(foreach look,debug-assertions overflow-checks,\

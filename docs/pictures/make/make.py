@@ -6,6 +6,8 @@ import time
 import browser
 import coupons
 import diagrams
+import law
+import others
 import runs
 import spar
 
@@ -15,7 +17,8 @@ PICTURES = {
     "local-wrinkle": spar.local_wrinkle, "cross-section": spar.cross_section, "energy-ledger": spar.energy_ledger,
     "kinematic": spar.kinematic, "bias-extension": coupons.bias_extension, "cantilever": coupons.cantilever, "buckling": coupons.buckling,
     "hemisphere": coupons.hemisphere, "speed-error": diagrams.speed_error, "bag-layers": diagrams.bag_layers,
-    "workflow-graph": diagrams.workflow_graph, "floors": diagrams.floors, "study": browser.study, "report": browser.report,
+    "workflow-graph": diagrams.workflow_graph, "floors": diagrams.floors, "law-in-python": law.law_in_python,
+    "files-of-others": others.files_of_others, "study": browser.study, "report": browser.report,
 }
 # Largest files, in bytes.
 LARGEST = {".png": 250_000, ".svg": 150_000}

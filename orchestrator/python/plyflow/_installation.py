@@ -40,6 +40,24 @@ def program() -> Path:
     raise NotFound(f"there is no program `plyflow`: looked for {looked}; install the wheel, or set PLYFLOW_PROGRAM")
 
 
+def carrier(name: str) -> Path:
+    """A library of which copies are made that hold what was written in Python. It lies beside the plugins of the program.
+
+    Raises:
+        NotFound: it is not there; says where it was looked for.
+
+    >>> carrier("python_law").name
+    'libplyflow_python_law.so'
+    """
+    folder = program().resolve().parent
+    candidates = [place / f"libplyflow_{name}.so" for place in (folder.parent / "lib" / "plyflow", folder)]
+    for candidate in candidates:
+        if candidate.is_file():
+            return candidate
+    looked = ", ".join(str(c) for c in candidates)
+    raise NotFound(f"there is no library libplyflow_{name}.so: looked for {looked}; install the wheel, or `make build`")
+
+
 def environment() -> Dict[str, str]:
     """What the program is told of this interpreter: plugins in Python are made and run by it, unless ``PLYFLOW_PYTHON`` names another."""
     return {"PLYFLOW_PYTHON": os.environ.get("PLYFLOW_PYTHON") or sys.executable}
@@ -62,7 +80,7 @@ def workflows_folder() -> Path:
 
 
 def templates_folder() -> Path:
-    """The folder of the templates in C and Rust, as they lie in the source. ``plyflow new`` makes a folder of one that builds where it is.
+    """The folder of the templates in C, Rust and Python, as they lie in the source. ``plyflow new`` makes a folder of one that builds where it is.
 
     >>> {"element-c", "material-c", "step-c"} <= {p.name for p in templates_folder().iterdir()}
     True

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Dict, List, NoReturn, Sequence, Tuple
 
 from . import _environment as environment
-from .errors import PlyflowError
+from .errors import InvalidInput, PlyflowError
 
 _PACKAGE = Path(__file__).resolve().parent
 _MAGIC = b"PLYFLOW-PYTHON-1"
@@ -133,7 +133,8 @@ def make(file: Path, into: Path, bridge: Path) -> Dict[str, Any]:
     else:
         from . import laws
 
-        made = laws._make(found[0], file, into)
+        # It lies where that of steps does.
+        made = laws._make(found[0], file, into, bridge.with_name("libplyflow_python_law.so"))
         library = Path(made["library"])
         watch += [Path(p) for p in made["watch"]]
     return {"library": str(library), "watch": sorted({str(path) for path in watch})}
@@ -151,6 +152,8 @@ def main() -> NoReturn:
     os.dup2(2, 1)
     try:
         answer = make(given.file.resolve(), given.into, given.bridge)
+    except InvalidInput as error:
+        answer = {"error": "; ".join(map(str, error.findings))}
     except PlyflowError as error:
         answer = {"error": str(error)}
     except OSError as error:

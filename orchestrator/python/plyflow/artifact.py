@@ -197,12 +197,12 @@ class Artifact:
         return {r["name"]: Number(r["value"], r["unit"]) for r in self._results}
 
     @property
-    def files(self) -> dict[str, str]:
-        """The text files that the artifact carries, such as a material file: contents by name."""
-        return {f["name"]: f["text"] for f in self.attributes.get("files", ())}
+    def files(self) -> dict[str, str | bytes]:
+        """The files that the artifact carries, such as a material file or a mesh for another program: contents by name. A file of bytes is ``bytes``."""
+        return {f["name"]: f["text"] if f.get("array") is None else self.array(f["array"]).tobytes() for f in self.attributes.get("files", ())}
 
     def write_files(self, folder: PathLike) -> list[Path]:
-        """Writes the text files into a folder, which is made if need be. A file that is there with another content is left alone.
+        """Writes the files into a folder, which is made if need be. A file that is there with another content is left alone.
 
         Raises:
             NotFound: the artifact carries none.
@@ -210,17 +210,18 @@ class Artifact:
         """
         files = self.files
         if not files:
-            raise NotFound(f"{self!r} carries no text files")
+            raise NotFound(f"{self!r} carries no files")
         to = Path(folder)
         to.mkdir(parents=True, exist_ok=True)
-        for name, text in files.items():
+        contents = {name: content.encode() if isinstance(content, str) else content for name, content in files.items()}
+        for name, content in contents.items():
             if name in (".", "..") or "/" in name or "\\" in name or "\0" in name:
                 raise PlyflowError(f"{self.path.name}: the file name {name!r} leads out of the folder; nothing was written")
-            if (to / name).exists() and (to / name).read_bytes() != text.encode():
+            if (to / name).exists() and (to / name).read_bytes() != content:
                 raise PlyflowError(f"{to / name} is there with another content, and nothing was written: name another folder, or remove it")
-        for name, text in files.items():
-            (to / name).write_bytes(text.encode())
-        return [to / name for name in files]
+        for name, content in contents.items():
+            (to / name).write_bytes(content)
+        return [to / name for name in contents]
 
     @property
     def fields(self) -> dict[str, list[FieldInfo]]:

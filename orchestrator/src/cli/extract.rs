@@ -1,4 +1,4 @@
-//! `extract`: writes the text files that an artifact carries.
+//! `extract`: writes the files that an artifact carries.
 
 use super::args::ExtractArgs;
 use super::inspect::artifact_of;
@@ -7,8 +7,8 @@ use super::table::{bytes, table};
 use crate::exit;
 use crate::said::{Done, Stop, print};
 use camino::{Utf8Path, Utf8PathBuf};
-use plyflow_artifact::Artifact;
-use plyflow_model::artifact::TextFile;
+use plyflow_artifact::{Artifact, DType};
+use plyflow_model::artifact::CarriedFile;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -22,8 +22,8 @@ pub fn extract(args: &ExtractArgs) -> Done {
     let opened = open(&args.workflow)?;
     let path = artifact_of(&opened, &args.step, &args.workflow.workflow)?;
     let artifact = Artifact::open(path.as_std_path()).map_err(|e| Stop::new(exit::INTERNAL, e))?;
-    let files = files(artifact.attributes())
-        .map_err(|e| Stop::new(exit::INTERNAL, format!("{}: {e}; {path}", args.step)))?;
+    let unusable = |e: NoFiles| Stop::new(exit::INTERNAL, format!("{}: {e}; {path}", args.step));
+    let files = files(artifact.attributes()).map_err(unusable)?;
     if files.is_empty() {
         let text = format!(
             "the artifact of {} carries no files; what it holds: plyflow inspect '{}' --workflow {}",
@@ -31,8 +31,10 @@ pub fn extract(args: &ExtractArgs) -> Done {
         );
         return Err(Stop::new(exit::USAGE, text));
     }
+    let read = files.iter().map(|f| ready(f, &artifact));
+    let files: Vec<Ready> = read.collect::<Result<_, _>>().map_err(unusable)?;
     if args.list {
-        let row = |f: &TextFile| vec![f.name.clone(), bytes(f.text.len() as u64)];
+        let row = |f: &Ready| vec![f.name.clone(), bytes(f.content.len() as u64)];
         let rows: Vec<Vec<String>> = files.iter().map(row).collect();
         return print(&table(&["file", "size"], &rows, &[1]));
     }
@@ -46,8 +48,16 @@ pub fn extract(args: &ExtractArgs) -> Done {
 enum NoFiles {
     #[error("its attributes: {0}")]
     Attributes(serde_json::Error),
-    #[error("its attribute 'files' is no list of name and text: {0}")]
+    #[error("its attribute 'files' is no list of a name with a text or an array: {0}")]
     List(serde_json::Error),
+    #[error("its file {name:?} has {given}; expected one of them; nothing is written")]
+    Content { name: String, given: &'static str },
+    #[error("its file {name:?} is to be the array '{array}', {why}; nothing is written")]
+    Array {
+        name: String,
+        array: String,
+        why: String,
+    },
     #[error("it carries a file with the name {name:?}, which {why}; nothing is written")]
     Unfit { name: String, why: &'static str },
     #[error("it carries two files with the name {0:?}; nothing is written")]
@@ -55,23 +65,65 @@ enum NoFiles {
 }
 
 /// The files in the attributes of an artifact, each with a name that stays in its folder.
-fn files(attributes: &str) -> Result<Vec<TextFile>, NoFiles> {
+fn files(attributes: &str) -> Result<Vec<CarriedFile>, NoFiles> {
     let attributes: Value = serde_json::from_str(attributes).map_err(NoFiles::Attributes)?;
     if attributes["files"].is_null() {
         return Ok(Vec::new());
     }
-    let files = Vec::<TextFile>::deserialize(&attributes["files"]).map_err(NoFiles::List)?;
+    let files = Vec::<CarriedFile>::deserialize(&attributes["files"]).map_err(NoFiles::List)?;
     for (i, file) in files.iter().enumerate() {
         let name = &file.name;
         if let Some(why) = unfit(name) {
             let name = name.clone();
             return Err(NoFiles::Unfit { name, why });
         }
+        let given = match (&file.text, &file.array) {
+            (None, None) => Some("neither `text` nor `array`"),
+            (Some(_), Some(_)) => Some("`text` and `array`"),
+            _ => None,
+        };
+        if let Some(given) = given {
+            let name = name.clone();
+            return Err(NoFiles::Content { name, given });
+        }
         if files[..i].iter().any(|f| f.name == *name) {
             return Err(NoFiles::Twice(name.clone()));
         }
     }
     Ok(files)
+}
+
+/// A file with its bytes.
+#[derive(Debug, PartialEq)]
+struct Ready {
+    name: String,
+    content: Vec<u8>,
+}
+
+/// Reads the array of a file that is one.
+fn ready(file: &CarriedFile, artifact: &Artifact) -> Result<Ready, NoFiles> {
+    let (name, text) = (file.name.clone(), file.text.clone().unwrap_or_default());
+    let Some(array) = file.array.clone() else {
+        let content = text.into_bytes();
+        return Ok(Ready { name, content });
+    };
+    let wrong = |why: String| NoFiles::Array {
+        name: name.clone(),
+        array: array.clone(),
+        why,
+    };
+    let info = artifact.contents().array(&array);
+    let info = info.ok_or_else(|| wrong("and the artifact has no such array".into()))?;
+    let (DType::U8, [n]) = (info.dtype, &info.shape[..]) else {
+        return Err(wrong(format!(
+            "which has the type {:?} and the shape {:?}; expected bytes (u8) with one index",
+            info.dtype, info.shape
+        )));
+    };
+    let mut content = vec![0; *n as usize];
+    let read = artifact.read_array(&array, DType::U8, &mut content);
+    read.map_err(|e| wrong(format!("which cannot be read: {e}")))?;
+    Ok(Ready { name, content })
 }
 
 /// Why a text cannot be the name of a file in the folder that the user gave.
@@ -92,8 +144,8 @@ fn unfit(name: &str) -> Option<&'static str> {
 }
 
 /// Writes all files or, when one is in the way, none; says what was done.
-fn write_all(files: &[TextFile], folder: &Utf8Path, force: bool) -> Result<String, Stop> {
-    let mut todo: Vec<(Utf8PathBuf, &TextFile, bool)> = Vec::new();
+fn write_all(files: &[Ready], folder: &Utf8Path, force: bool) -> Result<String, Stop> {
+    let mut todo: Vec<(Utf8PathBuf, &Ready, bool)> = Vec::new();
     let mut in_the_way = Vec::new();
     for file in files {
         let path = folder.join(&file.name);
@@ -105,7 +157,7 @@ fn write_all(files: &[TextFile], folder: &Utf8Path, force: bool) -> Result<Strin
                 return Err(Stop::new(exit::USAGE, text));
             }
             Ok(_) => {
-                let same = std::fs::read(&path).is_ok_and(|b| b == file.text.as_bytes());
+                let same = std::fs::read(&path).is_ok_and(|b| b == file.content);
                 if !same && !force {
                     in_the_way.push(path.to_string());
                 }
@@ -131,9 +183,9 @@ fn write_all(files: &[TextFile], folder: &Utf8Path, force: bool) -> Result<Strin
     let mut out = String::new();
     for (path, file, new) in todo {
         if new {
-            write(&path, &file.text).map_err(Stop::machine(format!("writing {path}")))?;
+            write(&path, &file.content).map_err(Stop::machine(format!("writing {path}")))?;
         }
-        let size = bytes(file.text.len() as u64);
+        let size = bytes(file.content.len() as u64);
         let what = if new { "" } else { ", as it was" };
         out += &format!("{path}: {size}{what}\n");
     }
@@ -141,8 +193,8 @@ fn write_all(files: &[TextFile], folder: &Utf8Path, force: bool) -> Result<Strin
 }
 
 /// Under a temporary name first, so that a whole file is there at any moment.
-fn write(path: &Utf8Path, text: &str) -> std::io::Result<()> {
-    plyflow_artifact::whole::write(path.as_std_path(), text.as_bytes())
+fn write(path: &Utf8Path, content: &[u8]) -> std::io::Result<()> {
+    plyflow_artifact::whole::write(path.as_std_path(), content)
 }
 
 #[cfg(test)]
@@ -171,7 +223,12 @@ mod tests {
     fn attributes_without_files_have_none_and_odd_ones_are_refused() {
         assert_eq!(files("{}").unwrap(), []);
         assert_eq!(files("{\"files\": []}").unwrap(), []);
-        for odd in ["", "{\"files\": 5}", "{\"files\": [{\"name\": \"a\"}]}"] {
+        for odd in [
+            "",
+            "{\"files\": 5}",
+            "{\"files\": [{\"name\": \"a\"}]}",
+            "{\"files\": [{\"name\": \"a\", \"text\": \"t\", \"array\": \"b\"}]}",
+        ] {
             assert!(files(odd).is_err(), "{odd}");
         }
         let twice = r#"{"files": [{"name": "a", "text": "1"}, {"name": "a", "text": "2"}]}"#;
@@ -184,10 +241,46 @@ mod tests {
         (dir, path)
     }
 
-    fn file(name: &str, text: &str) -> TextFile {
-        TextFile {
+    fn file(name: &str, text: &str) -> Ready {
+        Ready {
             name: name.into(),
-            text: text.into(),
+            content: text.into(),
+        }
+    }
+
+    #[test]
+    fn bytes_of_an_array_are_a_file_and_other_arrays_are_refused() {
+        use plyflow_artifact::ArtifactWriter;
+        let (_keep, dir) = folder();
+        let path = dir.join("a.vtkhdf");
+        let mut writer = ArtifactWriter::create(path.as_std_path(), "export").unwrap();
+        let all: Vec<u8> = (0..=255).collect();
+        let size = [all.len() as u64];
+        writer
+            .array("files/odd", DType::U8, &size, "", &all)
+            .unwrap();
+        writer
+            .array("files/wide", DType::U8, &[16, 16], "", &all)
+            .unwrap();
+        writer
+            .array("time", DType::F64, &[32], "s", &[0; 256])
+            .unwrap();
+        writer.finish(&serde_json::json!({})).unwrap();
+        let artifact = Artifact::open(path.as_std_path()).unwrap();
+        let of = |array: &str| CarriedFile {
+            name: "part.bin".into(),
+            text: None,
+            array: Some(array.into()),
+        };
+        let read = ready(&of("files/odd"), &artifact).unwrap();
+        assert_eq!((read.name.as_str(), &read.content), ("part.bin", &all));
+        for (array, why) in [
+            ("files/none", "has no such array"),
+            ("files/wide", "the shape [16, 16]"),
+            ("time", "the type F64"),
+        ] {
+            let error = ready(&of(array), &artifact).unwrap_err().to_string();
+            assert!(error.contains(array) && error.contains(why), "{error}");
         }
     }
 

@@ -49,8 +49,17 @@ pub fn mapping_help(node: &Node, what: &str) -> Option<String> {
             "write `tool: {{stl: {}}}`, with the length of one unit of the file",
             stl()
         )),
+        "tool" if is_step(text) => Some(format!(
+            "a step reads `{text}` and gives a body: `tool: {{input: {{body: ..}}}}` (the page \"Files of others\" of the book)"
+        )),
         _ => None,
     }
+}
+
+/// Whether a text names a STEP file.
+fn is_step(text: &str) -> bool {
+    let text = text.to_ascii_lowercase();
+    text.ends_with(".step") || text.ends_with(".stp")
 }
 
 /// Whether a text may stand in a list or mapping of one line as it is.

@@ -10,14 +10,15 @@ use crate::expect;
 use crate::hints::other_format;
 use crate::overrides::{self, Override};
 use crate::parameters::{Place, Resolver, absolute, find};
-use crate::resolved::{FailurePolicy, ResolvedStep, ResolvedWorkflow, Resources};
+use crate::resolved::{FailurePolicy, ResolvedInput, ResolvedStep, ResolvedWorkflow, Resources};
 use crate::study::{Asked, Family, PointsOf};
 use crate::wires::{self, Wiring};
-use crate::yaml::{Kind, Node};
+use crate::yaml::{Kind, Node, Span};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_files::open::{self, MOST_WRITTEN};
-use plyflow_model::artifact::Variation;
+use plyflow_model::artifact::{Attributes, Geometry, Variation};
 use plyflow_model::canonical;
+use plyflow_model::given::AskedFor;
 use plyflow_model::manifest::PluginKind;
 use plyflow_model::text::is_word;
 use plyflow_model::units::{Dimension, parse_quantity};
@@ -399,6 +400,13 @@ fn step(
         .filter(|n| matches!(n.kind, crate::yaml::Kind::Map(_)));
     let parameters = canonical(resolver.mapping(block, &manifest.parameters, &owner, &place));
     let components = resolver.components_in_order();
+    let asked = std::mem::take(&mut resolver.asked);
+    unwired(
+        draft,
+        &wiring.inputs[draft.index],
+        &asked,
+        resolver.problems,
+    );
     resolver.problems.of_step(None);
     let output = manifest.output.as_ref()?;
     Some(ResolvedStep {
@@ -416,6 +424,37 @@ fn step(
         resources: resources(node.get("resources")),
         retries: node.get("retries").and_then(whole).unwrap_or(0),
     })
+}
+
+/// Reports what a scene asks other steps for, where none is wired to the input at which it would arrive. A step without such an input has no use
+/// for it, or tells so itself.
+fn unwired(
+    draft: &Draft<'_>,
+    wired: &[ResolvedInput],
+    asked: &[(Source, Span, AskedFor)],
+    problems: &mut Problems,
+) {
+    let inputs = draft.plugin.iter().flat_map(|p| &p.manifest.inputs);
+    let mut takers = inputs.filter(|(_, port)| port.kind == Geometry::KIND);
+    let Some((name, port)) = takers.next() else {
+        return;
+    };
+    if wired.iter().any(|w| w.port == *name) {
+        return;
+    }
+    for (source, span, asked) in asked {
+        let message = format!(
+            "{asked} is to come from another step, and step `{}` does not wire its input `{name}`",
+            draft.name()
+        );
+        let d = problems.add(source, span, message);
+        d.expected(format!(
+            "`from: {{{name}: <step that gives `{}`>}}` in step `{}`",
+            port.kind,
+            draft.name()
+        ));
+        d.help(format!("{name}: {}", port.doc));
+    }
 }
 
 fn whole(node: &Node) -> Option<u32> {

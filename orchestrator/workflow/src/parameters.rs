@@ -11,6 +11,7 @@ use camino::{Utf8Component, Utf8Path, Utf8PathBuf};
 use indexmap::IndexMap;
 use plyflow_files::open::{self, FileError};
 use plyflow_files::text::shown;
+use plyflow_model::given::AskedFor;
 use plyflow_model::manifest::{Bounds, Declaration, Items, PluginKind, Shape, Unfit};
 use serde_json::{Map, Value, json};
 use std::rc::Rc;
@@ -27,6 +28,8 @@ pub(crate) struct Resolver<'a> {
     pub material_plugins: Vec<(String, Source, String)>,
     /// Files met so far.
     pub files: Vec<InputFile>,
+    /// What scenes ask other steps for: where, and what.
+    pub asked: Vec<(Source, Span, AskedFor)>,
 }
 
 /// Where a value is: its file, its JSON pointer in the step's parameters, its name for messages, and the
@@ -75,6 +78,7 @@ impl<'a> Resolver<'a> {
             components: Vec::new(),
             material_plugins: Vec::new(),
             files: Vec::new(),
+            asked: Vec::new(),
         }
     }
 
@@ -457,21 +461,15 @@ pub(crate) fn find(
     }: &Mention<'_>,
     kind: PluginKind,
 ) -> Option<Rc<CatalogEntry>> {
-    let article = if kind == PluginKind::Element {
-        "an"
-    } else {
-        "a"
+    let with_article = |kind: PluginKind| match kind {
+        PluginKind::Element => format!("an {kind}"),
+        _ => format!("a {kind}"),
     };
     match catalog.find(name, &source.folder) {
         Ok(entry) if entry.manifest.kind == kind => return Some(entry),
         Ok(entry) => {
-            let found = entry.manifest.kind;
-            let found = if found == PluginKind::Element {
-                format!("an {found}")
-            } else {
-                format!("a {found}")
-            };
-            let message = format!("`{name}` is {found} plugin, not {article} {kind} plugin");
+            let [found, wanted] = [entry.manifest.kind, kind].map(with_article);
+            let message = format!("`{name}` is {found} plugin, not {wanted} plugin");
             let names = catalog.names(kind);
             let d = problems.add(source, span, message);
             d.given(name)
@@ -481,7 +479,8 @@ pub(crate) fn find(
             let names = catalog.names(kind);
             let d = problems.add(source, span, e.to_string());
             d.once();
-            d.given(name).expected(format!("{article} {kind} plugin"));
+            d.given(name)
+                .expected(format!("{} plugin", with_article(kind)));
             match &e {
                 CatalogError::NotFound { searched, .. } => {
                     not_found(d, name, searched, &names, kind)

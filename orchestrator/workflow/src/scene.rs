@@ -11,7 +11,7 @@ use crate::yaml::{Kind, Node, Span};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_files::open::{self, MOST_WRITTEN};
 use plyflow_model::manifest::{PluginKind, Shape};
-use plyflow_model::{material::Material, scene::Scene, schema};
+use plyflow_model::{given, material::Material, scene::Scene, schema};
 use serde_json::{Value, json};
 use std::sync::{Arc, LazyLock};
 
@@ -182,6 +182,10 @@ pub fn scene_value(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> 
     match serde_json::from_value::<Scene>(scene).and_then(|mut scene| {
         // Prose does not matter to any result.
         scene.description = None;
+        for (path, asked) in given::asks(&scene) {
+            let span = scene_rules::place(node, &path);
+            resolver.asked.push((at.source.clone(), span, asked));
+        }
         serde_json::to_value(scene)
     }) {
         Ok(value) => Some(value),

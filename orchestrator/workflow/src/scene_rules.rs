@@ -111,6 +111,11 @@ fn follow<'n>(scene: &'n Node, path: &Path) -> Found<'n> {
     at
 }
 
+/// Where in a scene's text the value of a path stands, as far as that goes.
+pub fn place(scene: &Node, path: &Path) -> Span {
+    follow(scene, path).node.span.clone()
+}
+
 /// Tells a fault where it stands, unless something was found there before.
 fn show(fault: &Fault, scene: &Node, found: &[Span], source: &Source, problems: &mut Problems) {
     let at = follow(scene, &fault.path);

@@ -199,6 +199,10 @@ fn an_stl_without_its_unit_is_told_the_form() {
             "tool: spar.stl\n",
             "write `tool: {stl: {file: spar.stl, unit: 1 mm}}`",
         ),
+        (
+            "tool: spar.STEP\n",
+            "a step reads `spar.STEP` and gives a body: `tool: {input: {body: ..}}`",
+        ),
     ] {
         let mut text = common::SCENE.to_owned();
         text.replace_range(spar.clone(), tool);

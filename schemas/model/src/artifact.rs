@@ -18,6 +18,7 @@ mod coupon;
 mod defects;
 mod export;
 mod forming;
+mod geometry;
 mod measurement;
 mod mesh_study;
 mod shown;
@@ -50,13 +51,14 @@ pub use forming::{
     Depth, DepthPeak, Energy, FieldError, Forming, MeshQuality, POOR_JACOBIAN, Penetration,
     PenetrationPeak, PlainBody, RegionFacts, RigidBody, Sheet, SheetBody,
 };
+pub use geometry::Geometry;
 pub use measurement::{
     Compressed, FamilyCompression, FibreCompression, MeasuredBody, MeasuredDefect, Measurement,
     PlySlip, ScanAgreement, ScanAlignment, ScanDefect, Section, SectionOn, SlipCourse, SlipPair,
     SlipSection,
 };
 pub use mesh_study::{MeshStudy, ZoneAdvice};
-pub use shown::{Axis, Cell, Column, Map, Panel, Paths, Plot, Series, Style, Table, TextFile};
+pub use shown::{Axis, CarriedFile, Cell, Column, Map, Panel, Paths, Plot, Series, Style, Table};
 pub use study_table::{
     StudyBest, StudyFailure, StudyKeys, StudyOptimisation, StudyOrigin, StudyResponse,
     StudySamples, StudyTable, StudyValue, StudyVariable,

@@ -10,6 +10,7 @@ pub mod canonical;
 pub mod contour;
 pub mod fault;
 pub mod friction;
+pub mod given;
 pub mod job;
 pub mod manifest;
 pub mod material;

@@ -96,6 +96,14 @@ pub enum OutlineError {
         /// A place where they meet.
         at: Millimetres,
     },
+    /// A contour is made by another step, and has not been read.
+    #[error("{contour} {}", not_read(name))]
+    NotRead {
+        /// Where.
+        contour: ContourName,
+        /// Its name there.
+        name: String,
+    },
     /// Holes without an outline.
     #[error(
         "`holes` stand without `outline`; give a rectangle with holes as an outline of four points"
@@ -113,12 +121,20 @@ impl OutlineError {
     pub fn contour(&self) -> Option<ContourName> {
         match self {
             Self::Corners { contour, .. }
+            | Self::NotRead { contour, .. }
             | Self::Repeated { contour, .. }
             | Self::Crossing { contour, .. } => Some(*contour),
             Self::Outside { hole, .. } | Self::Holes { hole, .. } => Some(*hole),
             Self::HolesAlone | Self::TwoSizes => None,
         }
     }
+}
+
+/// Of a contour that another step makes, and that nobody has read: goes on from what it is.
+pub(crate) fn not_read(name: &str) -> String {
+    format!(
+        "is `{name}` of another step, and nothing gives it; expected a step that gives `geometry`, wired to the input `geometry`"
+    )
 }
 
 /// A point (m) that shows itself in mm.

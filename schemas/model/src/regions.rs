@@ -2,7 +2,9 @@
 
 use crate::contour::Contour;
 use crate::friction::Coefficient;
-use crate::outline::{OutlineError, Point, Region, segment_distance, sides, signed_area, winds};
+use crate::outline::{
+    OutlineError, Point, Region, not_read, segment_distance, sides, signed_area, winds,
+};
 use crate::units::{Angle, Length};
 use plyflow_fixed::FixedBits;
 use schemars::JsonSchema;
@@ -26,7 +28,7 @@ pub struct PlyRegion {
     pub name: String,
     /// A polygon (or circle) on the flat ply, relative to the ply's `centre`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("x-expected" = "a list of points, [[x, y], ..], or {circle: {radius: ..}}"))]
+    #[schemars(extend("x-expected" = "a list of points, [[x, y], ..], {circle: {radius: ..}}, or {input: NAME} from another step"))]
     pub polygon: Option<Contour>,
     /// A rectangle instead, each of whose sizes is one number.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -75,6 +77,9 @@ pub enum RegionError {
     /// It has both.
     #[error("has a `polygon` and a `rectangle`; expected one of the two")]
     TwoShapes,
+    /// Its shape is made by another step, and has not been read.
+    #[error("{}", not_read(.0))]
+    NotRead(String),
     /// Its shape bounds nothing.
     #[error("has no area of its own: {}", .0.to_string().replace("outline", "polygon"))]
     NoArea(OutlineError),
@@ -84,10 +89,14 @@ impl PlyRegion {
     /// Its corners over the tool (m), for a ply of this centre (m), counter-clockwise.
     ///
     /// # Errors
-    /// When it is no region: without a shape, with two, or with one that crosses itself.
+    /// When it is no region: without a shape, with two, with one that crosses itself, or with one that another step makes and that has not been
+    /// read.
     pub fn corners(&self, centre: Point) -> Result<Vec<Point>, RegionError> {
         let own = match (&self.polygon, &self.rectangle) {
-            (Some(polygon), None) => polygon.corners(),
+            (Some(polygon), None) => match polygon.input() {
+                Some(name) => return Err(RegionError::NotRead(name.to_owned())),
+                None => polygon.corners(),
+            },
             (None, Some(r)) => {
                 let ([x, y], (s, c)) = (r.centre.map(|v| v.si()), r.angle.si().fixed_sin_cos());
                 let (l, w) = (0.5 * r.length.si(), 0.5 * r.width.si());

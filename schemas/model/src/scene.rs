@@ -6,21 +6,21 @@
 
 use crate::friction::Friction;
 use crate::material::MaterialEntry;
-use crate::outline::{OutlineError, Point, Region};
+use crate::outline::{ContourName, OutlineError, Point, Region};
 use crate::regions::PlyRegion;
 use crate::units::{Angle, Length};
 use plyflow_fixed::FixedBits;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use crate::contour::{Circle, Contour, RoundContour};
+pub use crate::contour::{Circle, Contour, NamedContour};
 pub use crate::process::{
     DoubleDiaphragm, Hold, Holder, Press, PressPlate, PressureAt, PressureCourse, PressureTable,
     Process, Towards, WeightDirection,
 };
 pub use crate::tool::{
-    DoubleDomeTool, FlatTool, HemisphereTool, Joggle, JoggleSpar, RampedSpar, StlTool,
-    TetrahedronTool, Tool,
+    DoubleDomeTool, FlatTool, GivenSurface, HemisphereTool, InputTool, Joggle, JoggleSpar,
+    RampedSpar, StlTool, TetrahedronTool, Tool,
 };
 
 /// Version of the scene format that this crate reads.
@@ -99,9 +99,9 @@ pub struct Sheet {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub width: Option<Length>,
-    /// Plies, instead of length and width: the outline before forming, relative to `centre`.
+    /// Plies, instead of length and width: the outline before forming, relative to `centre`. One of another step brings its holes along.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("x-expected" = "a list of points, [[x, y], ..], or {circle: {radius: ..}}"))]
+    #[schemars(extend("x-expected" = "a list of points, [[x, y], ..], {circle: {radius: ..}}, or {input: NAME} from another step"))]
     pub outline: Option<Contour>,
     /// Plies with an outline: holes in it, relative to `centre`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -125,7 +125,7 @@ impl Sheet {
     /// The region of a sheet with an `outline`, over the tool; `None` for a sheet without one.
     ///
     /// # Errors
-    /// When outline and holes bound no region, or stand beside `length` and `width`.
+    /// When outline and holes bound no region, stand beside `length` and `width`, or are made by another step and have not been read.
     pub fn region(&self) -> Result<Option<Region>, OutlineError> {
         let Some(outline) = &self.outline else {
             return match self.holes.is_empty() {
@@ -136,6 +136,9 @@ impl Sheet {
         if self.length.is_some() || self.width.is_some() {
             return Err(OutlineError::TwoSizes);
         }
+        if let Some(error) = self.not_read(outline) {
+            return Err(error);
+        }
         let centre = self.centre.map(|c| c.si());
         let placed = |contour: &Contour| -> Vec<Point> {
             let corners = contour.corners().into_iter();
@@ -144,6 +147,17 @@ impl Sheet {
                 .collect()
         };
         Region::new(placed(outline), self.holes.iter().map(placed).collect()).map(Some)
+    }
+
+    /// The first of its contours that another step makes and that has not been read.
+    fn not_read(&self, outline: &Contour) -> Option<OutlineError> {
+        let holes = self.holes.iter().enumerate();
+        let all = holes.map(|(i, hole)| (ContourName::Hole(i), hole));
+        let mut all = std::iter::once((ContourName::Outline, outline)).chain(all);
+        all.find_map(|(contour, c)| {
+            let name = c.input()?.to_owned();
+            Some(OutlineError::NotRead { contour, name })
+        })
     }
 
     /// The rectangle of a sheet with `length` and `width` over the tool: x0, y0, x1, y1 (m).

@@ -107,6 +107,8 @@ pub fn profile() -> Value {
 struct Artifacts {
     /// A formed stack of sheets.
     forming: artifact::Forming,
+    /// Tools and outlines that a scene may name.
+    geometry: artifact::Geometry,
     /// What a detection flags on the plies of a formed run.
     defects: artifact::Defects,
     /// Where finer runs look closer; a collection.

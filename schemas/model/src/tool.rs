@@ -9,8 +9,9 @@ pub mod spar;
 use crate::units::{Angle, Length};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
-/// The rigid tool: one of the parametric generators or an STL file.
+/// The rigid tool: one of the parametric generators, an STL file, or what another step makes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Tool {
@@ -28,6 +29,8 @@ pub enum Tool {
     Tetrahedron(TetrahedronTool),
     /// A triangulated surface.
     Stl(StlTool),
+    /// A surface that another step makes.
+    Input(InputTool),
 }
 
 /// The spar of thesis chapter 5: a male tool of trapezoidal section whose height steps twice along its
@@ -214,4 +217,29 @@ pub struct StlTool {
     /// Moves the file's origin, after scaling.
     #[serde(default)]
     pub translate: [Length; 3],
+}
+
+/// A tool that another step makes: a body of an artifact at the input `geometry`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InputTool {
+    /// Name of the body.
+    pub body: String,
+    /// Moves the body.
+    #[serde(default)]
+    pub translate: [Length; 3],
+    /// Its triangles, once they have been read ([`crate::given::fill`]). They are no words of the scene.
+    #[serde(skip)]
+    pub given: Option<Arc<GivenSurface>>,
+}
+
+/// Triangles that a step has made.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GivenSurface {
+    /// Name of the step.
+    pub step: String,
+    /// Positions (m), one row per point: x, y, z.
+    pub points: Vec<[f64; 3]>,
+    /// Indices into `points`, one row per triangle, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
 }

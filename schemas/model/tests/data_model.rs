@@ -194,7 +194,7 @@ fn the_data_model_tells_every_attribute_that_the_types_have_and_no_other() {
         ("Plot", "plots"),
         ("Map", "maps"),
         ("Table", "tables"),
-        ("TextFile", "files"),
+        ("CarriedFile", "files"),
     ];
     let shown = shown.map(|(name, word)| (name.to_owned(), format!("[`{word}`](#{word})")));
     let mut tables = Tables {

@@ -31,7 +31,15 @@ pub(super) struct Stamp {
 
 /// Runs a command to its end: its standard output and its status, or no status when it had to be killed after
 /// [`LOAD_LIMIT`] or [`LONGEST_ANSWER`].
-pub(super) fn answer(mut command: Command) -> std::io::Result<(Vec<u8>, Option<ExitStatus>)> {
+pub(super) fn answer(command: Command) -> std::io::Result<(Vec<u8>, Option<ExitStatus>)> {
+    answer_within(LOAD_LIMIT, command)
+}
+
+/// [`answer`] with another limit of time.
+pub(super) fn answer_within(
+    limit: Duration,
+    mut command: Command,
+) -> std::io::Result<(Vec<u8>, Option<ExitStatus>)> {
     let mut child = command
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
@@ -47,7 +55,7 @@ pub(super) fn answer(mut command: Command) -> std::io::Result<(Vec<u8>, Option<E
         let whole = read.is_ok() && said.len() < LONGEST_ANSWER as usize;
         let _ = send.send(whole.then_some(said));
     });
-    match receive.recv_timeout(LOAD_LIMIT) {
+    match receive.recv_timeout(limit) {
         Ok(Some(said)) => Ok((said, Some(child.wait()?))),
         // One that goes on to talk is stopped as one that hangs.
         Ok(None) | Err(_) => {

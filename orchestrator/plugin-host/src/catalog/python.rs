@@ -1,7 +1,7 @@
 //! Plugins in Python: a library is made of the file, by the interpreter, and kept in a folder of the user's own. From then on it is a library
 //! as any other (`docs/decisions/0059`).
 
-use super::files::{Stamp, answer, stamp};
+use super::files::{Stamp, answer_within, stamp};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_artifact::whole;
 use serde::{Deserialize, Serialize};
@@ -23,6 +23,9 @@ const MARKS: [&str; 2] = ["@plyflow.step(", "@plyflow.law("];
 
 /// How long a library stays that was made of an earlier text of a file.
 const KEPT_FOR: Duration = Duration::from_secs(30 * 24 * 3600);
+
+/// How long a library may take to be made. A law is compiled for two kinds of processors, which takes some seconds on a quiet machine.
+const MAKE_LIMIT: Duration = Duration::from_secs(180);
 
 /// Version of the notes on what was made.
 const NOTE_VERSION: u32 = 1;
@@ -80,7 +83,7 @@ pub(super) enum NotMade {
         "the interpreter {0} cannot be started: {1}. Install Python 3.9 or later, or name one in PLYFLOW_PYTHON"
     )]
     NoInterpreter(String, std::io::Error),
-    #[error("{0} had not imported it after 30 s")]
+    #[error("{0} had not imported it, and made a library of it, after 180 s")]
     Hangs(String),
     #[error(
         "{0} ended without an answer; does it have numpy? `{0} -c 'import numpy'` tells. PLYFLOW_PYTHON names another interpreter"
@@ -132,8 +135,8 @@ impl Python {
             command.env_remove(name);
         }
         let interpreter = || self.interpreter.clone();
-        let (said, status) =
-            answer(command).map_err(|e| NotMade::NoInterpreter(interpreter(), e))?;
+        let (said, status) = answer_within(MAKE_LIMIT, command)
+            .map_err(|e| NotMade::NoInterpreter(interpreter(), e))?;
         status.ok_or_else(|| NotMade::Hangs(interpreter()))?;
         let made: Made =
             serde_json::from_slice(&said).map_err(|_| NotMade::Silent(interpreter()))?;

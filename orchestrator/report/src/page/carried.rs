@@ -5,7 +5,7 @@ use crate::page::carried_tables::table;
 use crate::plain::{FieldMap, Ply, id_of_row};
 use crate::read::{CARRIED, Facts, Run, coupon, files, maps, open, plots, shown_sheet, tables};
 use maud::{Markup, html};
-use plyflow_model::artifact::TextFile;
+use plyflow_model::artifact::CarriedFile;
 
 /// Plots that are drawn on a page.
 const PLOTS: usize = 120;
@@ -31,8 +31,8 @@ pub(crate) struct Shown {
     pub(crate) maps: Vec<FieldMap>,
     /// Its plots, drawn.
     pub(crate) plots: Vec<Markup>,
-    /// Its text files.
-    pub(crate) files: Vec<TextFile>,
+    /// Its files.
+    pub(crate) files: Vec<CarriedFile>,
     /// The first sheet of a coupon in the last frame.
     pub(crate) sheet: Option<Ply>,
     /// Energies of a coupon, if it has a history.

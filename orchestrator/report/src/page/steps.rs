@@ -8,7 +8,7 @@ use crate::page::expectations::{expected_text, got_text, verdict_and_source};
 use crate::plain::Ply;
 use crate::units::{bytes, quantity};
 use maud::{Markup, html};
-use plyflow_model::artifact::TextFile;
+use plyflow_model::artifact::CarriedFile;
 
 /// Width of a picture on the page (px).
 const PICTURE: f64 = 430.0;
@@ -154,14 +154,18 @@ fn pictures(sheet: &Ply, n: usize, sharp: Sharpness) -> Drawn {
     })
 }
 
-fn files(input: &ReportInput, label: &str, files: &[TextFile]) -> Markup {
+fn files(input: &ReportInput, label: &str, files: &[CarriedFile]) -> Markup {
     html! {
         p class="note" { "Files of this step, to be written with " code { (input.command("extract")) " '" (label) "'" } ":" }
         @for file in files {
-            @let beginning: String = file.text.chars().take(LONGEST).collect();
-            details {
-                summary { code { (file.name) } " " span class="note" { (bytes(file.text.len() as u64)) } }
-                pre { code { (beginning) @if beginning.len() < file.text.len() { "\n…" } } }
+            @if let Some(text) = &file.text {
+                @let beginning: String = text.chars().take(LONGEST).collect();
+                details {
+                    summary { code { (file.name) } " " span class="note" { (bytes(text.len() as u64)) } }
+                    pre { code { (beginning) @if beginning.len() < text.len() { "\n…" } } }
+                }
+            } @else {
+                p { code { (file.name) } }
             }
         }
     }

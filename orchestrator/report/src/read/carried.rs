@@ -3,7 +3,7 @@
 //! They come from a plugin that anybody may have written: what is wrong with an entry is a warning of the report, a text in `wrong`, and
 //! the rest is shown.
 
-use plyflow_model::artifact::TextFile;
+use plyflow_model::artifact::CarriedFile;
 use plyflow_model::units::parse_quantity_in;
 use serde::Deserialize;
 use serde_json::Value;
@@ -32,8 +32,8 @@ pub(crate) fn unreadable(what: &str, i: usize, entry: &Value, e: &serde_json::Er
     format!("{what} {} '{name}' of its attributes: {e}", i + 1)
 }
 
-/// The text files.
-pub(crate) fn files(attributes: &Value, wrong: &mut Vec<String>) -> Vec<TextFile> {
+/// The files.
+pub(crate) fn files(attributes: &Value, wrong: &mut Vec<String>) -> Vec<CarriedFile> {
     let value = &attributes["files"];
     if value.is_null() {
         return Vec::new();

@@ -111,6 +111,27 @@ pub const CASES: &[Case] = &[
     (
         S,
         "    length: 480 mm\n    width: 300 mm\n",
+        "    outline: {inptu: blank}\n",
+        0,
+        &["`inptu`", "did you mean `input`"],
+    ),
+    (
+        S,
+        "    length: 480 mm\n    width: 300 mm\n",
+        "    outline: {circle: {radius: 80 mm}, input: blank}\n",
+        0,
+        &["`outline` has several kinds", "keep one of them"],
+    ),
+    (
+        S,
+        "    length: 480 mm\n    width: 300 mm\n",
+        "    outline: {input: blank}\n    holes:\n      - [[0 mm, 0 mm]]\n    width: 300 mm\n",
+        3,
+        &["`width` stands beside `outline`"],
+    ),
+    (
+        S,
+        "    length: 480 mm\n    width: 300 mm\n",
         "    outline: {circle: {radus: 80 mm}}\n",
         0,
         &["`radus`", "did you mean `radius`"],

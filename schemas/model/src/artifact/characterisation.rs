@@ -1,7 +1,7 @@
 //! The kind `characterisation`: a law fitted to test data.
 
 use crate::artifact::attributes::Attributes;
-use crate::artifact::shown::{Plot, TextFile};
+use crate::artifact::shown::{CarriedFile, Plot};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -16,7 +16,7 @@ pub struct Characterisation {
     /// Plots of the data and of the law.
     pub plots: Vec<Plot>,
     /// The material file with the law in it, or the fragment of a material or of a scene that tells it.
-    pub files: Vec<TextFile>,
+    pub files: Vec<CarriedFile>,
     /// Of the profiles of hanging strips: names of the files, or of the step, that they are from.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sources: Option<Vec<String>>,

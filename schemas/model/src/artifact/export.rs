@@ -1,7 +1,7 @@
 //! The kind `export`: files for other programs.
 
 use super::attributes::Attributes;
-use super::shown::TextFile;
+use super::shown::CarriedFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Export {
     /// What `plyflow extract` writes.
-    pub files: Vec<TextFile>,
+    pub files: Vec<CarriedFile>,
 }
 
 impl Attributes for Export {

@@ -214,13 +214,28 @@ impl<T: Into<Self>> From<Option<T>> for Cell {
     }
 }
 
-/// A text file that `plyflow extract` writes (attribute `files`).
+/// A file that `plyflow extract` writes (attribute `files`): a text, or the bytes of an array.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub struct TextFile {
+pub struct CarriedFile {
     /// Of a file in one folder: without `/`, `\` and `..`, at most 200 bytes, and used once.
     pub name: String,
-    /// What is in it.
-    pub text: String,
+    /// What is in it, where it is a text.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub text: Option<String>,
+    /// Instead of `text`: path of an array below `/data` of type u8 and one index, which holds its bytes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub array: Option<String>,
+}
+
+impl CarriedFile {
+    /// A file of a text.
+    pub fn of_text(name: impl Into<String>, text: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            text: Some(text.into()),
+            array: None,
+        }
+    }
 }
 
 #[cfg(test)]

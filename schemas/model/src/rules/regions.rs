@@ -5,7 +5,7 @@ use crate::material::MaterialEntry;
 use crate::nearest::nearest;
 use crate::outline::{Millimetres, Point, cross, mirrored, segment_distance, sides, winds};
 use crate::process::Process;
-use crate::regions::{ALL, CLASSES, PlyRegion, SAME_PLACE, Stitches, edge_distance};
+use crate::regions::{ALL, CLASSES, PlyRegion, RegionError, SAME_PLACE, Stitches, edge_distance};
 use crate::rules::known::Known;
 use crate::scene::{Sheet, SheetKind};
 
@@ -109,6 +109,8 @@ pub fn check(known: &Known<'_>) -> Vec<Fault> {
             }
             texts.extend(effects(sheet, region, named.then_some(&partners[..])));
             match region.corners(sheet.centre.map(|c| c.si())) {
+                // What another step makes is looked at once it is there.
+                Err(RegionError::NotRead(_)) => {}
                 Err(why) => texts.push(why.to_string()),
                 Ok(corners) => {
                     texts.extend(places(sheet, (region, &corners), &before, &partners));

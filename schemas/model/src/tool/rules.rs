@@ -8,7 +8,7 @@ use crate::tool::spar::positive;
 use crate::tool::{DoubleDomeTool, HemisphereTool, TetrahedronTool, Tool};
 use plyflow_fixed::FixedBits;
 
-/// Whether a tool can be built. Files are looked at where they are read.
+/// Whether a tool can be built. Files, and what other steps make, are looked at where they are read.
 ///
 /// # Errors
 /// The first thing that keeps it from having a surface.
@@ -22,6 +22,7 @@ pub fn check(tool: &Tool) -> Result<(), Fault> {
         Tool::DoubleDome(t) => double_dome(t, &at),
         Tool::Tetrahedron(t) => tetrahedron(t, &at),
         Tool::Stl(stl) => positive(at.key("unit"), stl.unit.si()),
+        Tool::Input(_) => Ok(()),
     }?;
     few_facets(tool, &at)
 }
@@ -36,6 +37,7 @@ fn word(tool: &Tool) -> &'static str {
         Tool::DoubleDome(_) => "double_dome",
         Tool::Tetrahedron(_) => "tetrahedron",
         Tool::Stl(_) => "stl",
+        Tool::Input(_) => "input",
     }
 }
 
@@ -100,7 +102,8 @@ fn tetrahedron(t: &TetrahedronTool, at: &Path) -> Result<(), Fault> {
         .help("take a smaller radius or a higher tool"))
 }
 
-/// Whether a tool that is made from parameters has not too many facets to be made. Files have the facets that they have.
+/// Whether a tool that is made from parameters has not too many facets to be made. Files and what other steps make have the
+/// facets that they have.
 fn few_facets(tool: &Tool, at: &Path) -> Result<(), Fault> {
     let Some((plan, facet)) = plan_and_facet(tool) else {
         return Ok(());
@@ -128,11 +131,12 @@ pub fn plan_and_facet(tool: &Tool) -> Option<(f64, f64)> {
         Tool::Tetrahedron(t) => (0.25 * 3f64.sqrt() * t.edge.si().powi(2), t.facet_size.si()),
         Tool::DoubleDome(d) => (circle(d.dome_radius.si()), d.facet_size.si()),
         Tool::Hemisphere(h) => (circle(h.radius.si()), h.facet_size.si()),
-        Tool::Stl(_) => return None,
+        Tool::Stl(_) | Tool::Input(_) => return None,
     })
 }
 
-/// Whether a tool that can be built is its own mirror image in the plane x = 0 (`axis` 0) or y = 0 (1). Of a file nothing is known here.
+/// Whether a tool that can be built is its own mirror image in the plane x = 0 (`axis` 0) or y = 0 (1). Of a file, and of what another step
+/// makes, nothing is known here.
 pub fn is_mirrored(tool: &Tool, axis: usize) -> bool {
     match tool {
         Tool::JoggleSpar(spar) => spar.shape().is_ok_and(|s| spar_is_mirrored(&s, axis)),
@@ -141,7 +145,8 @@ pub fn is_mirrored(tool: &Tool, axis: usize) -> bool {
         | Tool::RampedSpar(_)
         | Tool::Hemisphere(_)
         | Tool::DoubleDome(_)
-        | Tool::Stl(_) => true,
+        | Tool::Stl(_)
+        | Tool::Input(_) => true,
     }
 }
 

@@ -76,7 +76,7 @@ impl Template {
             (None, Some(input)) => {
                 let told: Characterisation = host.attributes(input)?;
                 let origin = format!("step '{}'", input.step);
-                let mut texts = told.files.iter().map(|f| &f.text);
+                let mut texts = told.files.iter().filter_map(|f| f.text.as_ref());
                 let found = texts.find_map(|text| Self::parse(text, &origin).ok());
                 found.map(Some).ok_or_else(|| {
                     format!(

@@ -1,6 +1,6 @@
 //! The artifact of a characterisation: curves, plots of them, files, results.
 
-use plyflow_model::artifact::{self, Characterisation, Plot, Series, TextFile};
+use plyflow_model::artifact::{self, CarriedFile, Characterisation, Plot, Series};
 use plyflow_sdk::{Host, StepError};
 
 /// Label and unit of an axis; the curves are stored in SI, the unit is what is shown.
@@ -36,10 +36,7 @@ impl Output {
 
     /// A text file.
     pub fn file(&mut self, name: &str, text: &str) {
-        self.about.files.push(TextFile {
-            name: name.into(),
-            text: text.into(),
-        });
+        self.about.files.push(CarriedFile::of_text(name, text));
     }
 
     /// A named number.

@@ -3,7 +3,7 @@
 use crate::chord::CHORD_TOLERANCE;
 use crate::error::ToolError;
 use crate::mesh::ToolMesh;
-use crate::{double_dome, hemisphere, stl, sweep, tetrahedron};
+use crate::{double_dome, hemisphere, input, stl, sweep, tetrahedron};
 use plyflow_model::scene::Tool;
 use plyflow_model::tool::rules;
 use std::path::Path;
@@ -12,7 +12,7 @@ use std::path::Path;
 /// directory (see [`build_from`]).
 ///
 /// # Errors
-/// When the tool's words make no surface ([`rules::check`]), or its file is none.
+/// When the tool's words make no surface ([`rules::check`]), or its file, or what another step gave for it, is none.
 pub fn build(tool: &Tool) -> Result<ToolMesh, ToolError> {
     build_from(tool, Path::new(""))
 }
@@ -34,6 +34,7 @@ pub fn build_from(tool: &Tool, folder: &Path) -> Result<ToolMesh, ToolError> {
             let path = folder.join(&s.file);
             stl::read(&path, s.unit.si(), s.translate.map(|t| t.si()))?
         }
+        Tool::Input(t) => input::read(t)?,
     })
 }
 

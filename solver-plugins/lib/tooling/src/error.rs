@@ -20,6 +20,24 @@ pub enum ToolError {
     /// The file is no STL, or not all of it: `file:line: problem; remedy`.
     #[error("tool file {0}")]
     Stl(String),
+    /// What another step makes has not been read.
+    #[error(
+        "scene.tool.input.body: `{0}` is a body of another step, and nothing gives it; expected a step that gives `geometry`, wired to the input \
+         `geometry`"
+    )]
+    NotRead(String),
+    /// The triangles of another step do not make a usable surface.
+    #[error("scene.tool.input: body `{body}` of step `{step}`: {problem}; {remedy}")]
+    Input {
+        /// Name of the body.
+        body: String,
+        /// Name of the step.
+        step: String,
+        /// What is wrong, with the place of the first offence.
+        problem: String,
+        /// What to change.
+        remedy: String,
+    },
     /// The file's facets do not make a usable surface.
     #[error("tool file {}: {problem}; {remedy}", path.display())]
     Surface {

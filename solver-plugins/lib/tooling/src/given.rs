@@ -225,6 +225,7 @@ fn unit_question(scene: &Scene) -> String {
             ": is `unit` ({} m) the length of one unit of the file?",
             stl.unit.si()
         ),
+        Tool::Input(_) => ": are the points of the step's artifact in m?".into(),
         _ => String::new(),
     }
 }
@@ -233,6 +234,10 @@ fn unit_question(scene: &Scene) -> String {
 fn named(scene: &Scene) -> String {
     match &scene.tool {
         Tool::Stl(stl) => format!("scene.tool.stl: {}", stl.file),
+        Tool::Input(input) => {
+            let step = input.given.as_ref().map_or("?", |g| g.step.as_str());
+            format!("scene.tool.input: body `{}` of step `{step}`", input.body)
+        }
         _ => "scene.tool: the tool".into(),
     }
 }
@@ -262,15 +267,21 @@ fn check_foot(scene: &Scene, low: f64) -> Result<(), String> {
     if low.abs() <= FOOT {
         return Ok(());
     }
-    let translate = match &scene.tool {
-        Tool::Stl(stl) => stl.translate.map(|l| l.si()),
-        _ => [0.0; 3],
+    let (translate, and) = match &scene.tool {
+        Tool::Stl(stl) => (
+            stl.translate,
+            ", and `unit` the length of one unit of the file",
+        ),
+        Tool::Input(input) => (input.translate, ""),
+        _ => Default::default(),
     };
+    let translate = translate.map(|l| l.si());
     let [x, y, z] = translate;
+    let named = named(scene);
+    let (at, what) = named.split_once(": ").unwrap_or(("scene.tool", &named));
     Err(format!(
-        "scene.tool.stl: the lowest point of {} lies at z = {:.3} mm; expected a tool that stands on the bed, z = 0, with its axis at x = y = 0: \
-         `translate: [{} mm, {} mm, {} mm]`, and `unit` the length of one unit of the file",
-        named(scene).trim_start_matches("scene.tool.stl: "),
+        "{at}: the lowest point of {what} lies at z = {:.3} mm; expected a tool that stands on the bed, z = 0, with its axis at x = y = 0: \
+         `translate: [{} mm, {} mm, {} mm]`{and}",
         1e3 * low,
         1e3 * x,
         1e3 * y,

@@ -1,4 +1,4 @@
-//! Rigid tools: parametric generators and STL files give a [`ToolMesh`]; [`SignedDistanceGrid`] answers
+//! Rigid tools: parametric generators, STL files and other steps give a [`ToolMesh`]; [`SignedDistanceGrid`] answers
 //! the contact search with a distance and its exact gradient.
 //!
 //! Coordinates as in scenes: x along the tool, y across, z up, the machine bed is the plane z = 0.
@@ -15,9 +15,13 @@ mod error;
 pub mod facets;
 pub mod given;
 mod hemisphere;
+mod input;
 mod mesh;
+#[cfg(feature = "steps")]
+pub mod of_step;
 pub mod sdf;
 mod stl;
+mod surface;
 mod sweep;
 mod tetrahedron;
 mod tree;

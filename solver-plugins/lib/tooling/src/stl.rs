@@ -1,20 +1,16 @@
 //! Tools from STL files.
 
 use crate::error::ToolError;
-use crate::facets;
-use crate::mesh::{Adjacency, ToolMesh};
+use crate::mesh::ToolMesh;
+use crate::surface::{self, NoSurface, Origin};
 use plyflow_files::open::{self, MOST_DATA};
-use plyflow_files::stl::{self, Facets};
-use plyflow_geometry::vec3::{Vec3, dot, sub};
+use plyflow_files::stl;
+use plyflow_geometry::vec3::Vec3;
 use std::path::Path;
 
-/// How far above its lowest point, over its height, a tool may be open.
-const FOOT: f64 = 1e-3;
-
-/// Reads a file ([`plyflow_files::stl`]), joins its facets ([`facets::join`]) and checks that they are a surface with a consistent
-/// outside, open at its foot at most.
+/// Reads a file ([`plyflow_files::stl`]) and makes its facets a tool ([`surface::surface`]).
 pub(crate) fn read(path: &Path, unit: f64, translate: Vec3) -> Result<ToolMesh, ToolError> {
-    let surface_error = |problem: String, remedy: &str| ToolError::Surface {
+    let surface_error = |(problem, remedy): NoSurface| ToolError::Surface {
         path: path.to_owned(),
         problem,
         remedy: remedy.to_owned(),
@@ -25,156 +21,15 @@ pub(crate) fn read(path: &Path, unit: f64, translate: Vec3) -> Result<ToolMesh, 
     })?;
     let mut read = stl::parse(&bytes).map_err(|e| ToolError::Stl(e.of(path)))?;
     drop(bytes);
-    for corners in &mut read.corners {
-        for p in corners.iter_mut() {
-            *p = std::array::from_fn(|k| p[k] * unit + translate[k]);
-        }
-        if corners.as_flattened().iter().any(|c| !c.is_finite()) {
-            return Err(surface_error(
-                "it has a coordinate that is too large".to_owned(),
-                "export the file again",
-            ));
-        }
-    }
-    let surface = facets::join(&read.corners);
-    let mesh = ToolMesh {
-        points: surface.points,
-        triangles: surface.triangles,
-    };
-    if mesh.triangles.is_empty() {
-        return Err(surface_error(
-            format!("none of its {} facets has an area", read.corners.len()),
-            "export the tool's surface as facets",
-        ));
-    }
-    let checked = Checked {
-        mesh: &mesh,
-        facet: &surface.facet,
-        read: &read,
+    let mut corners = std::mem::take(&mut read.corners);
+    let origin = Origin {
         unit,
+        units: "in the file's units",
         translate,
+        place: &|facet| read.place(facet),
     };
-    checked
-        .check()
-        .map_err(|(problem, remedy)| surface_error(problem, remedy))?;
-    Ok(mesh)
-}
-
-/// A surface beside the file that it is of.
-struct Checked<'a> {
-    mesh: &'a ToolMesh,
-    /// Facet of the file for each of the mesh.
-    facet: &'a [u32],
-    read: &'a Facets,
-    unit: f64,
-    translate: Vec3,
-}
-
-impl Checked<'_> {
-    /// A point in the file's units.
-    fn point(&self, p: Vec3) -> String {
-        let q: Vec3 = std::array::from_fn(|k| (p[k] - self.translate[k]) / self.unit);
-        format!("({:.4}, {:.4}, {:.4})", q[0], q[1], q[2])
-    }
-
-    /// An edge, and the first facet of the file that has it.
-    fn edge(&self, [a, b]: [u32; 2]) -> String {
-        let has = |t: &[u32; 3]| t.contains(&a) && t.contains(&b);
-        let of = self.mesh.triangles.iter().position(has);
-        let place = of.map_or(String::new(), |t| {
-            format!(", {}", self.read.place(self.facet[t] as usize))
-        });
-        let [p, q] = [a, b].map(|p| self.point(self.mesh.points[p as usize]));
-        format!("the edge from {p} to {q} (in the file's units{place})")
-    }
-
-    fn check(&self) -> Result<(), (String, &'static str)> {
-        let (mesh, adjacency) = (self.mesh, self.mesh.adjacency());
-        if let Some(edge) = adjacency.crowded {
-            return Err((
-                format!("{} has more than two facets", self.edge(edge)),
-                "export one surface without double or inner walls",
-            ));
-        }
-        if let Some(edge) = adjacency.flipped {
-            return Err((
-                format!(
-                    "the two facets at {} are oriented against each other",
-                    self.edge(edge)
-                ),
-                "make the normals consistent (in MeshLab: Re-Orient all faces coherently)",
-            ));
-        }
-        self.outside(&adjacency)?;
-        // A rim higher up has no outside beside it.
-        let [low, high] = mesh.bounds();
-        let near = low[2] + FOOT * (high[2] - low[2]);
-        let is_high = |edge: &&[u32; 2]| edge.iter().any(|p| mesh.points[*p as usize][2] > near);
-        if let Some(edge) = adjacency.open.iter().find(is_high) {
-            return Err((
-                format!(
-                    "it has a hole or a free rim above its foot: {} has one facet only ({} such edges in all)",
-                    self.edge(*edge),
-                    adjacency.open.iter().filter(is_high).count()
-                ),
-                "close it (in MeshLab: Close Holes), or draw its walls down to its foot",
-            ));
-        }
-        Ok(())
-    }
-
-    /// Whether each body has its outside outside.
-    fn outside(&self, adjacency: &Adjacency) -> Result<(), (String, &'static str)> {
-        let mesh = self.mesh;
-        // About a point at the foot: where a tool is open there, what is missing has no part in it.
-        let [low, high] = mesh.bounds();
-        let foot = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2]];
-        let bodies = bodies(adjacency);
-        let count = bodies.iter().max().map_or(0, |b| b + 1);
-        let (mut volumes, mut first) = (vec![0.0; count], vec![usize::MAX; count]);
-        for (t, &body) in bodies.iter().enumerate() {
-            volumes[body] += dot(sub(mesh.corners(t)[0], foot), mesh.area_normal(t)) / 6.0;
-            first[body] = first[body].min(t);
-        }
-        let Some(body) = volumes.iter().position(|v| *v <= 0.0) else {
-            return Ok(());
-        };
-        let which = match count {
-            1 => "its facets point inwards".to_owned(),
-            n => format!(
-                "the facets of one of its {n} bodies, that at {} (in the file's units, {}), point inwards",
-                self.point(mesh.corners(first[body])[0]),
-                self.read.place(self.facet[first[body]] as usize)
-            ),
-        };
-        Err((
-            format!("{which} (volume {:.3e} m3)", volumes[body]),
-            "flip the facets so that they point away from the tool; a cavity inside of a tool is to be left out",
-        ))
-    }
-}
-
-/// For each facet the body of which it is: facets that share edges. The order is that of their first facets.
-fn bodies(adjacency: &Adjacency) -> Vec<usize> {
-    let mut of = vec![usize::MAX; adjacency.neighbour.len()];
-    let mut count = 0;
-    for first in 0..of.len() {
-        if of[first] != usize::MAX {
-            continue;
-        }
-        let mut open = vec![first];
-        of[first] = count;
-        while let Some(t) = open.pop() {
-            for next in adjacency.neighbour[t].into_iter().flatten() {
-                if of[next as usize] == usize::MAX {
-                    of[next as usize] = count;
-                    open.push(next as usize);
-                }
-            }
-        }
-        count += 1;
-    }
-    of
+    surface::placed(&mut corners, &origin).map_err(surface_error)?;
+    surface::surface(&corners, &origin).map_err(surface_error)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 // What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
-use plyflow_model::artifact::{Export, TextFile};
+use plyflow_model::artifact::{CarriedFile, Export};
 use plyflow_sdk::{BodyInfo, Host, Input, On, Step, StepError, export_step};
 use std::fmt::Write;
 
@@ -48,7 +48,7 @@ impl Step for ExportCsv {
                 points(host, &input, body, frame)?,
                 cells(host, &input, body, frame)?,
             ] {
-                written += file.text.len();
+                written += file.text.as_ref().map_or(0, String::len);
                 files.push(file);
             }
             if written > MOST {
@@ -84,7 +84,7 @@ fn points(
     input: &Input,
     body: &BodyInfo,
     frame: usize,
-) -> Result<TextFile, StepError> {
+) -> Result<CarriedFile, StepError> {
     let places = host.frame_points(input, body, frame)?;
     let columns = columns(host, input, body, frame, On::Points)?;
     let mut text = header("node,x (m),y (m),z (m)", &columns);
@@ -96,7 +96,12 @@ fn points(
     Ok(file(body, "points", text))
 }
 
-fn cells(host: &Host, input: &Input, body: &BodyInfo, frame: usize) -> Result<TextFile, StepError> {
+fn cells(
+    host: &Host,
+    input: &Input,
+    body: &BodyInfo,
+    frame: usize,
+) -> Result<CarriedFile, StepError> {
     let (_, nodes) = host.mesh(input, body)?;
     let columns = columns(host, input, body, frame, On::Cells)?;
     let names = (1..=body.nodes_per_cell).map(|k| format!(",node_{k}"));
@@ -166,7 +171,7 @@ fn end_row(text: &mut String, columns: &[Column], row: usize) {
     text.push('\n');
 }
 
-fn file(body: &BodyInfo, what: &str, text: String) -> TextFile {
+fn file(body: &BodyInfo, what: &str, text: String) -> CarriedFile {
     // Names of bodies may hold what no name of a file does.
     let fit = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
     let name: String = body
@@ -174,8 +179,5 @@ fn file(body: &BodyInfo, what: &str, text: String) -> TextFile {
         .chars()
         .map(|c| if fit(c) { c } else { '_' })
         .collect();
-    TextFile {
-        name: format!("{}-{what}.csv", name.replace("..", "__")),
-        text,
-    }
+    CarriedFile::of_text(format!("{}-{what}.csv", name.replace("..", "__")), text)
 }

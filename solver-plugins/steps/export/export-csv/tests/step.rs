@@ -62,11 +62,11 @@ fn the_last_frame_is_written_with_every_digit() {
         ]
     );
     assert_eq!(
-        export.files[0].text,
+        export.files[0].text.as_deref().unwrap(),
         "node,x (m),y (m),z (m),height\n0,0,0,0.25,0.1\n1,0.1,0,0.25,0.2\n2,0,0.1,0.25,0.30000000000000004\n3,0.1,0.1,0.25,0.4\n"
     );
     assert_eq!(
-        export.files[1].text,
+        export.files[1].text.as_deref().unwrap(),
         "cell,node_1,node_2,node_3,node_4,stress_1,stress_2\n0,0,1,3,2,0.1,-0.1\n"
     );
     assert_eq!(
@@ -83,7 +83,13 @@ fn the_last_frame_is_written_with_every_digit() {
 fn a_frame_and_bodies_can_be_chosen() {
     let (artifact, export) = export(json!({"time": 0.2, "bodies": ["ply_1"]})).unwrap();
     assert_eq!(export.files.len(), 2);
-    assert!(export.files[0].text.contains("\n3,0.1,0.1,0,4\n"));
+    assert!(
+        export.files[0]
+            .text
+            .as_ref()
+            .unwrap()
+            .contains("\n3,0.1,0.1,0,4\n")
+    );
     assert_eq!(artifact.result("time"), 0.0);
 }
 

@@ -15,6 +15,7 @@ use crate::stack::{Body, Components};
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component};
 use plyflow_mechanics::team;
 use plyflow_sdk::{Host, Log, Progress};
+use plyflow_tooling::of_step;
 
 struct HostComponents<'a>(&'a Host);
 
@@ -32,6 +33,7 @@ unsafe impl Components for HostComponents<'_> {
 /// Runs the step.
 pub fn run(host: &Host) -> Result<()> {
     let mut p: Parameters = host.parameters()?;
+    of_step::read(host, &mut p.scene)?;
     if let Some(size) = advised_size(host)? {
         let text = format!("element_size {:.3} mm, as advised", 1e3 * size);
         host.log(Log::Info, &text);

@@ -10,7 +10,7 @@ use plyflow_model::artifact::{FieldError, Forming, MeshQuality, RigidBody, Sheet
 use plyflow_model::budget::{self, Wanted};
 use plyflow_model::scene::{Process, Scene};
 use plyflow_sdk::{Host, Log, On, Progress, StepError};
-use plyflow_tooling::{ToolMesh, given};
+use plyflow_tooling::{ToolMesh, given, of_step};
 use serde::Deserialize;
 use std::time::Instant;
 
@@ -49,8 +49,9 @@ struct Done {
 /// # Errors
 /// Whatever stops it, as a text for the user.
 pub(crate) fn run(host: &Host) -> Result<(), StepError> {
-    let p: Parameters = host.parameters()?;
+    let mut p: Parameters = host.parameters()?;
     report(host, 0.0, "reading the tool");
+    of_step::read(host, &mut p.scene)?;
     let plies = plies(&p.scene)?;
     let tool = given::checked(&p.scene, p.tool_grid)?;
     let surface = SmoothSurface::new(&tool, p.crease_angle)
