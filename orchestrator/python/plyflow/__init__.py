@@ -14,7 +14,7 @@ All numbers are in SI units. Only numpy and h5py are needed; pandas, xarray, pyv
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Union
+from typing import TYPE_CHECKING, Any, Sequence, Union
 
 if TYPE_CHECKING:
     from . import declare
@@ -82,12 +82,13 @@ def _version() -> str:
         return "0+source"
 
 
-def open(path: PathLike, verify: bool = True) -> Union[Run, Store, Artifact]:
+def open(path: PathLike, verify: bool = True, trust: Union[bool, Sequence[PathLike]] = False) -> Union[Run, Store, Artifact]:
     """Opens a workflow file (what the store has of it), a store (a folder), or an artifact (an HDF5 file).
 
     Args:
         path: of either.
         verify: whether the program looks at an artifact before it is read, whether its bytes are those that were written.
+        trust: of a workflow: as for :func:`plyflow.run`.
 
     Raises:
         NotFound: there is no such file or folder, or no store in it.
@@ -107,4 +108,4 @@ def open(path: PathLike, verify: bool = True) -> Union[Run, Store, Artifact]:
         raise NotFound(f"there is no file or folder {place}; give a workflow file, a store or an artifact")
     if h5py.is_hdf5(place):
         return Artifact(place, verify=verify)
-    return Run(place, verify=verify)
+    return Run(place, verify=verify, trust=trust)

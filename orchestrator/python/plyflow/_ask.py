@@ -25,6 +25,13 @@ def words_of(settings: Settings | None) -> list[str]:
     return words
 
 
+def trusted(trust: bool | Sequence[PathLike]) -> list[str]:
+    """``--trust`` for all libraries of the workflow, or for each that is named."""
+    if isinstance(trust, (str, os.PathLike)):
+        raise TypeError(f"trust={trust!r}: expected True, False or a list of paths; a single path is a list of one")
+    return (["--trust"] if trust else []) if isinstance(trust, bool) else [f"--trust={os.fspath(path)}" for path in trust]
+
+
 def plain(value: Any) -> Any:
     """A value of plain Python: paths as text, tuples as lists, numbers of numpy as numbers.
 

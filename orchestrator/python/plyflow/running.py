@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-import signal
 import os
+import signal
 import subprocess
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Callable, Sequence
 
-from ._ask import PathLike, Settings, error_of, words_of
+from ._ask import PathLike, Settings, error_of, trusted, words_of
 from ._installation import environment, program
 from .build import Workflow
 from .errors import Finding, InvalidInput, PlyflowError, RunFailed
@@ -68,6 +68,7 @@ def run(
     report: bool = True,
     confirm: bool = False,
     path: PathLike | None = None,
+    trust: bool | Sequence[PathLike] = False,
 ) -> Run:
     """Runs what the store does not have yet of a workflow, and returns the run.
 
@@ -83,6 +84,7 @@ def run(
         report: whether the HTML report is written beside the workflow.
         confirm: whether zones are also run in other ways, to say which defects stay.
         path: where a :class:`Workflow` is written [default: ``workflow.yaml`` in the current folder].
+        trust: whether libraries and files in Python that the workflow names may be loaded, or which of them. They can do all that you can do.
 
     Raises:
         InvalidInput: the workflow has errors; nothing was run.
@@ -96,7 +98,7 @@ def run(
     elif path is not None:
         raise PlyflowError("`path` says where a Workflow is written; a file stays where it is")
     file = Path(workflow)
-    words = ["run", "--log-format", "json", *words_of(set)]
+    words = ["run", "--log-format", "json", *words_of(set), *trusted(trust)]
     words += [w for step in until for w in ("--until", step)] + [w for step in force for w in ("--force", step)]
     words += [] if jobs is None else ["--jobs", str(jobs)]
     words += [] if store is None else ["--store", str(store)]
@@ -104,7 +106,7 @@ def run(
     code, events = _follow([*words, "--", str(file)], on_event)
     if code != 0:
         raise _error(code, events)
-    return Run(file, store=store, set=set)
+    return Run(file, store=store, set=set, trust=trust)
 
 
 def _follow(words: Sequence[str], on_event: Callable[[Event], None] | None) -> tuple[int, list[Event]]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Iterator, Mapping, Sequence
 
-from ._ask import PathLike, Settings, ask, findings, needed, refuse, words_of
+from ._ask import PathLike, Settings, ask, findings, needed, refuse, trusted, words_of
 from .artifact import Artifact, Body, FieldInfo, Number, Values
 from .errors import NotFound, PlyflowError
 from .study import Study
@@ -154,15 +154,23 @@ class Run(_Steps):
         store: its store [default: ``.plyflow`` beside it].
         set: other values of parameters, as for :func:`plyflow.run`: ``{"coarse.element_size": "12 mm"}``.
         verify: whether artifacts are looked at by the program before they are read.
+        trust: as for :func:`plyflow.run`.
 
     Raises:
         NotFound: there is no such file.
         InvalidInput: it has errors.
     """
 
-    def __init__(self, workflow: PathLike, store: PathLike | None = None, set: Settings | None = None, verify: bool = True) -> None:
+    def __init__(
+        self,
+        workflow: PathLike,
+        store: PathLike | None = None,
+        set: Settings | None = None,
+        verify: bool = True,
+        trust: bool | Sequence[PathLike] = False,
+    ) -> None:
         self.workflow = Path(workflow)
-        self._options: list[str] = words_of(set)
+        self._options: list[str] = [*words_of(set), *trusted(trust)]
         if store is not None:
             self._options += ["--store", str(store)]
         self._store = store

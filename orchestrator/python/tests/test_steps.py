@@ -340,3 +340,18 @@ def test_another_interpreter_has_its_own_packages_alone(place: Place) -> None:
     (place.folder / "made.py").write_text('import plyflow\n@plyflow.step("made", output="x")\ndef run(step):\n    """Does."""\n    step.log("done")\n')
     done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, env=other, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_run_from_python_says_whom_it_trusts(place: Place) -> None:
+    place.step('step.write_attributes({"by": "python"})')
+    with pytest.raises(plyflow.InvalidInput, match="was not loaded"):
+        plyflow.run(place.workflow, report=False)
+    with pytest.raises(TypeError, match="list of one"):
+        plyflow.run(place.workflow, report=False, trust=str(place.folder / "made.py"))
+    run = plyflow.run(place.workflow, report=False, trust=[place.folder / "made.py"])
+    assert run["made"].artifact.attributes == {"by": "python"}
+    (place.folder / "made.py").write_text((place.folder / "made.py").read_text() + "\n")
+    with pytest.raises(plyflow.InvalidInput):
+        plyflow.open(place.workflow)
+    opened = plyflow.open(place.workflow, trust=True)
+    assert isinstance(opened, plyflow.Run) and opened["made"].state == "to run"
