@@ -6,7 +6,6 @@ import json
 import math
 import os
 import re
-import shutil
 import subprocess
 import sys
 import textwrap
@@ -430,28 +429,30 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def runs_and_meets_its_closed_form(folder: Path) -> None:
-    code, checks = judged(folder / "my_fabric.py", "--material", str(folder / "my-fabric.yaml"))
+def runs_and_meets_its_closed_form(folder: Path, law: str, sheet: str, runs: int) -> None:
+    code, checks = judged(folder / law, "--material", str(folder / sheet))
     assert code == 0 and len(checks) >= 27 and set(checks.values()) == {"passed"}, checks
     words = [str(plyflow.program()), "run", str(folder / "workflow.yaml"), "--check", "--no-report"]
     refused = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
     assert refused.returncode != 0 and "plyflow trust" in refused.stderr
     done = subprocess.run([*words, "--trust"], stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
-    assert done.returncode == 0 and "1 run, 0 cached" in done.stdout, done
+    assert done.returncode == 0 and f"{runs} run, 0 cached" in done.stdout, done
 
 
 def test_the_template_runs_in_a_workflow_and_meets_its_closed_form(folder: Path) -> None:
-    place = Path(shutil.copytree(plyflow.templates_folder() / "material-python", folder / "my-fabric"))
-    runs_and_meets_its_closed_form(place)
+    told = subprocess.run([str(plyflow.program()), "new", "material", "my-weave", "--python"], capture_output=True, text=True, check=False)
+    assert told.returncode == 0, told
+    place = folder / "my-weave"
+    runs_and_meets_its_closed_form(place, "my_weave.py", "sheet.yaml", 2)
     # The library is that of the code, not of the words around it.
-    source = place / "my_fabric.py"
+    source = place / "my_weave.py"
     source.write_text("# A comment.\n" + source.read_text())
     words = [str(plyflow.program()), "run", str(place / "workflow.yaml"), "--check", "--no-report", "--trust"]
     again = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=True)
-    assert "0 run, 1 cached" in again.stdout
+    assert "0 run, 2 cached" in again.stdout
     source.write_text(source.read_text().replace('default="400 N/m"', 'default="500 N/m"'))
     again = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
-    assert again.returncode == 5 and "1 run, 0 cached" in again.stdout, again
+    assert again.returncode == 5 and "2 run, 0 cached" in again.stdout, again
 
 
 def test_the_law_of_the_page_runs_and_its_bounds_hold(folder: Path) -> None:
@@ -460,7 +461,7 @@ def test_the_law_of_the_page_runs_and_its_bounds_hold(folder: Path) -> None:
     material, workflow = blocks(page, "yaml")
     for name, text in (("my_fabric.py", law), ("my-fabric.yaml", material), ("workflow.yaml", workflow)):
         (folder / name).write_text(text)
-    runs_and_meets_its_closed_form(folder)
+    runs_and_meets_its_closed_form(folder, "my_fabric.py", "my-fabric.yaml", 1)
     (folder / "my_fabric.py").write_text(law + bounds)
     runs_again = judged(folder / "my_fabric.py", "--material", str(folder / "my-fabric.yaml"))
     assert runs_again[0] == 0 and set(runs_again[1].values()) == {"passed"}, runs_again

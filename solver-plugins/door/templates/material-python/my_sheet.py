@@ -5,11 +5,11 @@ from plyflow import declare
 
 
 @plyflow.law(
-    "my-fabric",
+    "my-sheet",
     version="0.1.0",
     vendor="You",
     parameters={
-        "fibre_stiffness": declare.quantity("force_per_length", exclusive_minimum="0 N/m", default="50 kN/m", doc="Stress over strain of both families."),
+        "fibre_stiffness": declare.quantity("force_per_length", exclusive_minimum="0 N/m", default="200 kN/m", doc="Stress over strain of both families."),
         "shear_stiffness": declare.quantity("force_per_length", minimum="0 N/m", default="100 N/m", doc="Elastic shear at small angles."),
         "shear_stiffening": declare.quantity("force_per_length", minimum="0 N/m", default="400 N/m", doc="Its part that grows with the cube."),
         "friction": declare.quantity("force_per_length", minimum="0 N/m", default="20 N/m", doc="Shear stress at which the yarns slip."),
