@@ -486,7 +486,7 @@ pub(crate) fn find(
                     not_found(d, name, searched, &names, kind)
                 }
                 CatalogError::Broken { path, .. } if path.extension() == Some("py") => {
-                    d.help("the page \"A step in Python\" of the book says what such a file needs; PLYFLOW_PYTHON names the interpreter");
+                    d.help("the pages \"A step in Python\" and \"From an idea to a law\" of the book say what such a file needs; PLYFLOW_PYTHON names the interpreter");
                 }
                 CatalogError::Broken { .. } => {
                     d.help("rebuild the plugin against the ABI of this program");

@@ -7,6 +7,9 @@
 //!
 //! Without a payload this is no plugin: `plyflow_plugin` answers NULL.
 
+// What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod child;
 mod message;
 mod payload;
