@@ -6,7 +6,6 @@ import json
 import math
 import os
 import re
-import shutil
 import subprocess
 import sys
 import textwrap
@@ -430,28 +429,29 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def runs_and_meets_its_closed_form(folder: Path) -> None:
-    code, checks = judged(folder / "my_fabric.py", "--material", str(folder / "my-fabric.yaml"))
+def runs_and_meets_its_closed_form(folder: Path, material: str = "my-fabric.yaml", runs: int = 1) -> None:
+    code, checks = judged(folder / "my_fabric.py", "--material", str(folder / material))
     assert code == 0 and len(checks) >= 27 and set(checks.values()) == {"passed"}, checks
     words = [str(plyflow.program()), "run", str(folder / "workflow.yaml"), "--check", "--no-report"]
     refused = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
     assert refused.returncode != 0 and "plyflow trust" in refused.stderr
     done = subprocess.run([*words, "--trust"], stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
-    assert done.returncode == 0 and "1 run, 0 cached" in done.stdout, done
+    assert done.returncode == 0 and f"{runs} run, 0 cached" in done.stdout, done
 
 
 def test_the_template_runs_in_a_workflow_and_meets_its_closed_form(folder: Path) -> None:
-    place = Path(shutil.copytree(plyflow.templates_folder() / "material-python", folder / "my-fabric"))
-    runs_and_meets_its_closed_form(place)
+    subprocess.run([str(plyflow.program()), "new", "material", "my-fabric", "--python"], capture_output=True, check=True, cwd=folder)
+    place = folder / "my-fabric"
+    runs_and_meets_its_closed_form(place, "sheet.yaml", runs=2)
     # The library is that of the code, not of the words around it.
     source = place / "my_fabric.py"
     source.write_text("# A comment.\n" + source.read_text())
     words = [str(plyflow.program()), "run", str(place / "workflow.yaml"), "--check", "--no-report", "--trust"]
     again = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=True)
-    assert "0 run, 1 cached" in again.stdout
+    assert "0 run, 2 cached" in again.stdout
     source.write_text(source.read_text().replace('default="400 N/m"', 'default="500 N/m"'))
     again = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
-    assert again.returncode == 5 and "1 run, 0 cached" in again.stdout, again
+    assert again.returncode == 5 and "2 run, 0 cached" in again.stdout, again
 
 
 def test_the_law_of_the_page_runs_and_its_bounds_hold(folder: Path) -> None:

@@ -5,7 +5,7 @@ from plyflow import declare
 
 
 @plyflow.law(
-    "my-fabric",
+    "my-sheet",
     version="0.1.0",
     vendor="You",
     parameters={
