@@ -332,14 +332,21 @@ fn what_is_wrong_with_a_coupon_is_a_warning_and_its_energies_are_drawn_all_the_s
 fn a_characterisation_without_plots_shows_its_numbers_and_odd_files_are_a_warning() {
     let (_keep, folder) = folder();
     let mut study = Study::new(&folder);
-    let about = json!({"files": [{"name": "a"}]});
+    let both = json!({"name": "b", "text": "t", "array": "files/b"});
+    let about = json!({"files": [{"name": "a"}, both, {"name": "whole.csv", "text": "t"}]});
     let results = vec![("bending_stiffness", 1e-3, "N m")];
     study.artifact(("peirce", &[]), "characterisation", &[], &about, results);
     let mut input = study.input();
     input.expectations.clear();
     let page = page(&input, &folder);
     assert!(page.contains("Tests and plots") && page.contains("bending_stiffness"));
-    assert!(warnings(&page).contains("peirce: its attribute 'files'"));
+    let told = warnings(&page);
+    assert_eq!(
+        told.matches("peirce: its attribute 'files'").count(),
+        2,
+        "{told}"
+    );
+    assert!(page.contains("whole.csv"), "the rest is shown");
 }
 
 #[test]

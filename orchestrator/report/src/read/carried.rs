@@ -38,10 +38,22 @@ pub(crate) fn files(attributes: &Value, wrong: &mut Vec<String>) -> Vec<CarriedF
     if value.is_null() {
         return Vec::new();
     }
-    Vec::deserialize(value).unwrap_or_else(|e| {
+    let mut files: Vec<CarriedFile> = Vec::deserialize(value).unwrap_or_else(|e| {
         wrong.push(format!("its attribute 'files': {e}"));
         Vec::new()
-    })
+    });
+    // `plyflow extract` refuses these too: a page must not promise a file that is none.
+    files.retain(|file| {
+        let one = file.text.is_some() != file.array.is_some();
+        if !one {
+            let name = &file.name;
+            wrong.push(format!(
+                "its attribute 'files': {name:?} has not one of `text` and `array`"
+            ));
+        }
+        one
+    });
+    files
 }
 
 /// What has a list without what is in that, and the list as it is told: each of its entries is read by itself, so that a wrong one does not
