@@ -47,6 +47,12 @@ def _owners() -> Dict[str, List[metadata.Distribution]]:
     return owners
 
 
+def place_of(distribution: metadata.Distribution) -> List[Path]:
+    """The folder that describes an installed package. Its name has the version, so another version is another folder."""
+    described = getattr(distribution, "_path", None)
+    return [] if described is None else [Path(described)]
+
+
 def packages(modules: Iterable[str]) -> Packages:
     """What these modules, which are loaded, belong to. Plyflow itself, the standard library and what is built in are left out."""
     owners: Optional[Dict[str, List[metadata.Distribution]]] = None
@@ -68,9 +74,7 @@ def packages(modules: Iterable[str]) -> Packages:
         for distribution in owners.get(top, []):
             called = distribution.metadata["Name"]
             found.versions[called] = distribution.version
-            described = getattr(distribution, "_path", None)
-            if described is not None:
-                found.files.append(Path(described))
+            found.files.extend(place_of(distribution))
         if owners.get(top):
             seen.add(top)
         else:

@@ -75,9 +75,11 @@ def _versions(packages: environment.Packages, requires: Sequence[str]) -> Dict[s
     found = dict(packages.versions)
     for name in requires:
         try:
-            found[metadata.distribution(name).metadata["Name"]] = metadata.version(name)
+            distribution = metadata.distribution(name)
         except metadata.PackageNotFoundError:
             raise Unusable(f"it requires the package {name}, which {sys.executable} does not have: pip install {name}") from None
+        found[distribution.metadata["Name"]] = distribution.version
+        packages.files.extend(environment.place_of(distribution))
     return dict(sorted(found.items()))
 
 
@@ -116,6 +118,8 @@ def make(file: Path, into: Path, bridge: Path) -> Dict[str, Any]:
     if len(found) != 1:
         names = ", ".join(d.manifest["name"] for d in found) or "none"
         raise Unusable(f"{file.name} must have one function that is decorated with `plyflow.step` or `plyflow.law`; it has: {names}")
+    # It also finds the places of packages that only the run imports.
+    versions = _versions(packages, found[0].requires)
     watch: List[Path] = [*sources.values(), *packages.files, Path(sys.executable)]
     if found[0].kind == "step":
         carried = {
@@ -123,7 +127,7 @@ def make(file: Path, into: Path, bridge: Path) -> Dict[str, Any]:
             "main": file.name,
             "sources": {name: path.read_text(encoding="utf-8") for name, path in sorted(sources.items())},
             "python": environment.python(),
-            "packages": _versions(packages, found[0].requires),
+            "packages": versions,
             "modules": modules,
         }
         payload = json.dumps(carried, sort_keys=True).encode()

@@ -355,3 +355,24 @@ def test_a_run_from_python_says_whom_it_trusts(place: Place) -> None:
         plyflow.open(place.workflow)
     opened = plyflow.open(place.workflow, trust=True)
     assert isinstance(opened, plyflow.Run) and opened["made"].state == "to run"
+
+
+def test_another_version_of_a_package_that_only_the_run_imports_makes_the_step_anew(place: Place) -> None:
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(place.folder / "own")], check=True)
+    packages = next((place.folder / "own").glob("lib/python3*/site-packages"))
+    described = packages / "late_thing-1.0.dist-info"
+    described.mkdir()
+    (described / "METADATA").write_text("Metadata-Version: 2.1\nName: late-thing\nVersion: 1.0\n")
+    (described / "top_level.txt").write_text("late_thing\n")
+    (packages / "late_thing.py").write_text("VALUE = 1\n")
+    text = 'import plyflow\n@plyflow.step("made", output="x", requires=["late-thing"])\ndef run(step):\n    """Does."""\n    import late_thing\n'
+    (place.folder / "made.py").write_text(text + '    step.write_attributes({"value": late_thing.VALUE})\n')
+    other = {**place.environment(), "PLYFLOW_PYTHON": str(place.folder / "own" / "bin" / "python")}
+    command = [str(plyflow.program()), "run", "--no-report", "--trust", str(place.workflow)]
+    first = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, env=other, check=False)
+    assert first.returncode == 0, first.stderr
+    described = described.rename(packages / "late_thing-2.0.dist-info")
+    (described / "METADATA").write_text("Metadata-Version: 2.1\nName: late-thing\nVersion: 2.0\n")
+    (packages / "late_thing.py").write_text("VALUE = 2\n")
+    again = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, env=other, check=False)
+    assert again.returncode == 0 and "1 run, 0 cached" in again.stdout + again.stderr, again.stdout + again.stderr
