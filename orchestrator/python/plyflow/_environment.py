@@ -68,6 +68,10 @@ def packages(modules: Iterable[str]) -> Packages:
         installed = {"site-packages", "dist-packages"} & set(path.parts)
         if not installed and any(folder in path.parents for folder in standard):
             continue
+        if not installed:
+            # Also of `pip install -e`, which leaves a version and takes the files where they lie: they change, and the version does not.
+            found.others[name] = path
+            continue
         if top in seen:
             continue
         owners = _owners() if owners is None else owners

@@ -376,3 +376,21 @@ def test_another_version_of_a_package_that_only_the_run_imports_makes_the_step_a
     (packages / "late_thing.py").write_text("VALUE = 2\n")
     again = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, env=other, check=False)
     assert again.returncode == 0 and "1 run, 0 cached" in again.stdout + again.stderr, again.stdout + again.stderr
+
+
+def test_a_package_that_is_installed_in_place_is_refused(place: Place, tmp_path_factory: pytest.TempPathFactory) -> None:
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    (elsewhere / "in_place.py").write_text("VALUE = 1\n")
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(place.folder / "own")], check=True)
+    packages = next((place.folder / "own").glob("lib/python3*/site-packages"))
+    described = packages / "in_place-1.0.dist-info"
+    described.mkdir()
+    (described / "METADATA").write_text("Metadata-Version: 2.1\nName: in-place\nVersion: 1.0\n")
+    (described / "top_level.txt").write_text("in_place\n")
+    (packages / "in_place.pth").write_text(f"{elsewhere}\n")
+    (place.folder / "made.py").write_text('import in_place\nimport plyflow\n@plyflow.step("made", output="x")\ndef run(step):\n    """Does."""\n')
+    other = {**place.environment(), "PLYFLOW_PYTHON": str(place.folder / "own" / "bin" / "python")}
+    command = [str(plyflow.program()), "run", "--no-report", "--trust", str(place.workflow)]
+    refused = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, env=other, check=False)
+    said = " ".join(refused.stderr.replace("│", " ").split())
+    assert refused.returncode == 3 and "neither beside it nor of an installed package" in said, refused.stderr
