@@ -116,6 +116,9 @@ def _undeclared(job: Mapping[str, Any], before: set[str]) -> Optional[str]:
             f"{job['main']} imports the package {name} only while it runs, so its version is not part of the step's key; "
             f'import it at the top of the file, or give requires=["{name}"] to `plyflow.step`'
         )
+    for name, path in sorted(found.others.items()):
+        if sys.modules[name].__file__ not in job["sources"]:
+            return f"{job['main']} imports {name} from {path} while it runs, which is of no installed package, so nobody would see a change of it"
     return None
 
 
