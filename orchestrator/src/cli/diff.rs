@@ -75,8 +75,17 @@ fn pairs(args: &DiffArgs) -> Result<Vec<Pair>, Stop> {
         plugins: args.plugins.clone(),
         trust: args.trust.clone(),
     };
-    let first = last_run(&args.a, places(&args.store_a), &args.steps)?;
-    let second = last_run(&args.b, places(&args.store_b), &args.steps)?;
+    let (first, of_first) = last_run(&args.a, places(&args.store_a), &args.steps)?;
+    let (second, of_second) = last_run(&args.b, places(&args.store_b), &args.steps)?;
+    let real = |path: &Utf8Path| path.canonicalize_utf8().unwrap_or_else(|_| path.to_owned());
+    if real(&of_first) == real(&of_second) {
+        let text = format!(
+            "{} and {} have one name and one store, which knows the last run of a name alone ({of_first}): there are no two runs to compare. Run one of them into \
+             another store and give that with --store-b, or give one another `name`",
+            args.a, args.b
+        );
+        return Err(Stop::new(exit::USAGE, text));
+    }
     let find = |all: &[Made], label: &str| {
         let found = all.iter().find(|(l, _)| l == label);
         found.map(|(_, path)| path.clone())
@@ -114,8 +123,12 @@ fn items_of(store: &Store, keys: &[Key]) -> (u64, BTreeSet<Vec<u64>>) {
     (longest, recorded)
 }
 
-/// What a workflow ran last, whatever program and plugins it was.
-fn last_run(file: &Utf8Path, places: Places, only: &[String]) -> Result<Vec<Made>, Stop> {
+/// What a workflow ran last, whatever program and plugins it was, and the journal that says so.
+fn last_run(
+    file: &Utf8Path,
+    places: Places,
+    only: &[String],
+) -> Result<(Vec<Made>, Utf8PathBuf), Stop> {
     let opened = open(&Workflow {
         workflow: file.to_owned(),
         places,
@@ -168,7 +181,7 @@ fn last_run(file: &Utf8Path, places: Places, only: &[String]) -> Result<Vec<Made
     }
     match found.iter().all(|(_, path)| path.is_none()) {
         true if only.is_empty() => Err(nothing()),
-        _ => Ok(found),
+        _ => Ok((found, path)),
     }
 }
 

@@ -78,6 +78,8 @@ pub struct Cluster {
     records: HashMap<usize, (String, Box<Record>)>,
     wake: Option<OwnedFd>,
     wishes: Rc<Cell<u32>>,
+    /// What steps have taken that came to no artifact, since it was asked for (s).
+    lost_seconds: f64,
     look: Instant,
     pause: Duration,
     hard: bool,
@@ -134,6 +136,7 @@ impl Cluster {
             records: HashMap::new(),
             wake,
             wishes: Rc::default(),
+            lost_seconds: 0.0,
             look: Instant::now(),
             pause: LOOKS[0],
             hard: false,
@@ -236,8 +239,11 @@ impl Cluster {
         self.by_attempt.remove(attempt);
         let _ = std::fs::create_dir_all(work.log.parent().unwrap_or(Utf8Path::new(".")));
         let _ = std::fs::rename(log, &work.log);
-        if let Outcome::Done(record) = &outcome {
-            self.records.insert(id, (attempt.clone(), record.clone()));
+        match &outcome {
+            Outcome::Done(record) => {
+                self.records.insert(id, (attempt.clone(), record.clone()));
+            }
+            _ => self.lost_seconds += work.spent,
         }
         self.told.push((shape.name(), attempt.clone()));
         for (shape, attempt) in work.older {
@@ -310,6 +316,9 @@ impl Cluster {
             return false;
         };
         let is_late = work.order.attempt != verdict.attempt;
+        if !matches!(verdict.outcome, Outcome::Done(_)) {
+            work.spent += verdict.seconds * f64::from(work.order.shape.cores);
+        }
         if let Outcome::Done(record) = &verdict.outcome {
             if !self.exchange.is_whole(&verdict.attempt, record, ENDING) {
                 let since = *work.late.get_or_insert_with(Instant::now);
@@ -435,6 +444,7 @@ impl Executor for Cluster {
             late: None,
             older: Vec::new(),
             log: task.log,
+            spent: 0.0,
         };
         self.works.insert(task.id, work);
         self.provider.hurry();
@@ -502,6 +512,10 @@ impl Executor for Cluster {
                 to_sealed(&record).and_then(|bytes| publish(&file, &bytes, record.is_lasting()));
         }
         Some((self.exchange.made(&attempt, ENDING), file))
+    }
+
+    fn lost_seconds(&mut self) -> Option<f64> {
+        Some(std::mem::take(&mut self.lost_seconds))
     }
 
     fn close(&mut self) {

@@ -20,6 +20,8 @@ pub(super) struct Work {
     pub older: Vec<(String, String)>,
     /// Where the engine wants the log.
     pub log: Utf8PathBuf,
+    /// What its attempts have taken of the cores of their allocations (s).
+    pub spent: f64,
 }
 
 impl Work {

@@ -179,6 +179,12 @@ pub trait Executor {
         None
     }
 
+    /// What steps have taken that ended without an artifact, since this was asked for (s): the time of the cores that were given to them.
+    /// `None` where their processes are of this machine, which knows better.
+    fn lost_seconds(&mut self) -> Option<f64> {
+        None
+    }
+
     /// Nothing more will be submitted.
     fn close(&mut self) {}
 }

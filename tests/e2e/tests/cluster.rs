@@ -196,3 +196,70 @@ fn a_cancelled_run_stops_with_checkpoints_and_the_next_goes_on_from_them() {
     let ends = cluster.ledger("end");
     assert_eq!((ends.len(), ends.values().max()), (3, Some(&1)), "{ends:?}");
 }
+
+#[test]
+fn an_optimisation_keeps_its_allocation_from_round_to_round_and_under_another_head() {
+    let text = |ledger: &str| {
+        format!(
+            "optimise:\n  minimise: r\n  over: {{x: {{from: 0, to: 4}}}}\n  method: simplex\n  budget: 10\n\
+             steps:\n  a: {{plugin: patient, with: {{value: \"(${{x}} - 1) * (${{x}} - 1)\", seconds: 0.3, ledger: {ledger}}}}}\n\
+             responses:\n  r: {{step: a, result: value}}\n"
+        )
+    };
+    let table = |study: &Study| {
+        let output = study.call(&["results", "--study", "--format", "csv"]);
+        let text = String::from_utf8(output.stdout).expect("a table");
+        // What a step took is another time each time.
+        let rows = text.lines().map(|l| l.split(',').take(3).collect());
+        rows.collect::<Vec<Vec<_>>>()
+            .iter()
+            .map(|r| r.join(","))
+            .collect::<Vec<_>>()
+    };
+    let home = Study::new(&text("\"\""));
+    assert_eq!(home.run(&[]).code, Some(0));
+    let cluster = Cluster::new("");
+    let ledger = cluster.study.path("ledger");
+    cluster.study.write(&text(ledger.to_str().expect("a path")));
+    std::fs::write(
+        cluster.study.path("profile.yaml"),
+        PROFILE.replace("idle: 1 s", "idle: 30 s"),
+    )
+    .expect("a profile");
+    let mut head = cluster.head("first.log");
+    wait_for("some rounds", || cluster.ledger("end").len() >= 4);
+    head.kill().expect("a head to kill");
+    head.wait().expect("a child");
+    let end = cluster.run();
+    assert_eq!(end.code, Some(0), "{end:?}");
+    let found = table(&cluster.study);
+    assert_eq!((found.len(), &found), (11, &table(&home)));
+    for word in ["begin", "end"] {
+        let counts = cluster.ledger(word);
+        assert_eq!(counts.values().max(), Some(&1), "{word}: {counts:?}");
+    }
+    let jobs = std::fs::read_dir(cluster.study.path("jobs")).expect("a folder");
+    assert_eq!(jobs.count(), 1, "one allocation for all rounds");
+    // It is not left to wait for more.
+    let running = || {
+        let output = cluster.plyflow(&["status"]).output().expect("plyflow");
+        String::from_utf8_lossy(&output.stdout).contains("RUNNING")
+    };
+    wait_for("the end of the allocation", || !running());
+}
+
+#[test]
+fn points_that_fail_in_allocations_use_up_the_time_of_an_optimisation() {
+    // Every point fails, and there is always another one to ask for.
+    let cluster = Cluster::new(
+        "optimise:\n  minimise: r\n  over: {x: {from: 0, to: 4}}\n  method: evolution\n  budget: 200 ms\n\
+         steps:\n  formed: {plugin: error, with: {value: \"${x}\", beyond: -1}}\n  a: {plugin: trivial, from: {in: formed}}\n\
+         responses:\n  r: {step: a, result: value}\n",
+    );
+    let end = cluster.run();
+    assert!(end.code == Some(0) && end.failed > 0, "{end:?}");
+    let kept = cluster.study.path(".plyflow/runs/study/asked.json");
+    let kept = std::fs::read_to_string(kept).expect("what was asked");
+    let kept: serde_json::Value = serde_json::from_str(&kept).expect("JSON");
+    assert!(kept["cpu_seconds"].as_f64() >= Some(0.2), "{kept}");
+}

@@ -122,3 +122,27 @@ steps:
     assert_eq!(status(&["--step", "two"]).0, ["same-bytes", "same-bytes"]);
     assert_eq!(status(&["--step", "one@v=2"]).0, ["in-neither"]);
 }
+
+#[test]
+fn two_files_of_one_name_in_one_store_are_not_compared_with_themselves() {
+    let study = Study::new("\nsteps:\n  one: {plugin: trivial, with: {value: 1}}\n");
+    assert_eq!(study.run(&[]), well(1, 0));
+    let text = std::fs::read_to_string(study.path("workflow.yaml")).unwrap();
+    let other = study.path("other.yaml");
+    std::fs::write(&other, text.replace("value: 1", "value: 2")).unwrap();
+    let other = other.to_str().unwrap();
+    for b in [other, "workflow.yaml"] {
+        let output = study.call(&["diff", b]);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains("no two runs to compare"), "{said}");
+    }
+    // Another store has another last run of the name.
+    let elsewhere = study.path("elsewhere");
+    let elsewhere = elsewhere.to_str().unwrap();
+    let words = ["run", "--store", elsewhere, "--no-report"];
+    let run = study.command_on("other.yaml", &words).output().unwrap();
+    assert!(run.status.success(), "{run:?}");
+    let output = study.call(&["diff", other, "--store-b", elsewhere]);
+    assert_eq!(output.status.code(), Some(9), "{output:?}");
+}

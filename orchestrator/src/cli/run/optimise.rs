@@ -31,6 +31,57 @@ pub fn of(opened: &Opened) -> Option<Optimisation> {
     opened.workflow.study.as_ref()?.optimisation.clone()
 }
 
+/// Where the steps of all rounds run.
+#[derive(Default)]
+struct Places {
+    /// What `--on` says, once a round has something to run.
+    on: Option<Option<On>>,
+    place: Option<Place>,
+}
+
+impl Places {
+    /// What `--on` says.
+    fn on(&mut self, args: &RunArgs) -> Result<Option<&On>, Stop> {
+        if self.on.is_none() {
+            self.on = Some(On::chosen(args.on.as_deref(), &args.workflow.workflow)?);
+        }
+        Ok(self.on.as_ref().and_then(Option::as_ref))
+    }
+
+    /// The place for a round.
+    fn open(&mut self, opened: &Opened, interrupts: &Interrupts) -> Result<&mut Place, Stop> {
+        if self.place.is_none() {
+            let root = opened.store.root();
+            let wake = interrupts
+                .poll_end()
+                .map_err(Stop::machine(format!("running with the store {root}")))?;
+            let on = self.on.as_ref().and_then(Option::as_ref);
+            self.place = Some(Place::open(on, opened, wake)?);
+        }
+        Ok(self.place.as_mut().expect("just opened"))
+    }
+
+    /// A round has ended. Allocations stay for the next one: each may have waited in a queue for hours. Workers of this machine end, as only
+    /// then what they took is known.
+    fn rest(&mut self) {
+        if !matches!(self.on, Some(Some(_))) {
+            self.close();
+        }
+    }
+
+    fn close(&mut self) {
+        if let Some(mut place) = self.place.take() {
+            place.executor.close();
+        }
+    }
+}
+
+impl Drop for Places {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
 /// How far a run has come.
 #[derive(Default)]
 struct Way {
@@ -87,6 +138,7 @@ pub fn run(args: &RunArgs, opened: &Opened, o: Optimisation, begun: Instant) -> 
         failed: kept.map_or_else(BTreeMap::new, |k| k.failed),
         ..Way::default()
     };
+    let mut places = Places::default();
     loop {
         let points = asked(search, &o, &mut way)?;
         keep(&o, &way, &points).write(&folder).map_err(machine())?;
@@ -94,7 +146,7 @@ pub fn run(args: &RunArgs, opened: &Opened, o: Optimisation, begun: Instant) -> 
             break;
         }
         let before = way.told.len();
-        round(args, points.clone(), &mut way, &interrupts)?;
+        round(args, points.clone(), &mut way, (&mut places, &interrupts))?;
         // What failed in a round that ends the run has taken its time as well.
         let rest = &points[way.told.len() - before..];
         keep(&o, &way, rest).write(&folder).map_err(machine())?;
@@ -106,6 +158,7 @@ pub fn run(args: &RunArgs, opened: &Opened, o: Optimisation, begun: Instant) -> 
             break;
         }
     }
+    drop(places);
     let all: Vec<Vec<Value>> = way.told.iter().map(|t| t.point.clone()).collect();
     let opened = open_at(&args.workflow, &all)?;
     let session = opened.look()?;
@@ -144,7 +197,7 @@ fn round(
     args: &RunArgs,
     points: Vec<Vec<Value>>,
     way: &mut Way,
-    interrupts: &Interrupts,
+    (places, interrupts): (&mut Places, &Interrupts),
 ) -> Result<(), Stop> {
     let mut opened = open_at(&args.workflow, &points)?;
     let mut lines = {
@@ -165,11 +218,10 @@ fn round(
         let mut names: Vec<String> = names.into_iter().map(str::to_owned).collect();
         names.sort_unstable();
         opened.restrict(&names)?;
-        let on = On::chosen(args.on.as_deref(), &args.workflow.workflow)?;
-        if let Some(on) = &on {
+        if let Some(on) = places.on(args)? {
             on.prepare(&mut opened)?;
         }
-        let session = execute(args, (&opened, on.as_ref()), way, interrupts)?;
+        let session = execute(args, &opened, way, (places, interrupts))?;
         let found = read(&session);
         for i in open {
             lines[i] = found[i].clone();
@@ -209,9 +261,9 @@ fn read(session: &Session<'_>) -> Vec<Line> {
 /// Runs the wanted steps of an opened workflow.
 fn execute<'o>(
     args: &RunArgs,
-    (opened, on): (&'o Opened, Option<&On>),
+    opened: &'o Opened,
     way: &mut Way,
-    interrupts: &Interrupts,
+    (places, interrupts): (&mut Places, &Interrupts),
 ) -> Result<Session<'o>, Stop> {
     let machine = || Stop::machine(format!("running with the store {}", opened.store.root()));
     let options = options(args, opened)?;
@@ -222,9 +274,8 @@ fn execute<'o>(
         observer.end();
         return Err(stop);
     }
-    let wake = interrupts.poll_end().map_err(machine())?;
     let before = children_seconds();
-    let mut place = Place::open(on, opened, wake)?;
+    let place = places.open(opened, interrupts)?;
     let mut failed = false;
     for round in 0.. {
         let (ended, summary) = session
@@ -253,12 +304,11 @@ fn execute<'o>(
             return Err(Stop::new(exit::DAMAGED, text));
         }
     }
-    // Its workers end with it, and only then what they took is known.
-    place.executor.close();
-    drop(place);
+    let elsewhere = place.executor.lost_seconds();
+    places.rest();
     let counted = way.take(&session);
     // What was stopped took some of it, and runs again.
-    let spent = (children_seconds() - before - counted).max(0.0);
+    let spent = elsewhere.unwrap_or_else(|| (children_seconds() - before - counted).max(0.0));
     way.take_failed(
         &session,
         (failed && !way.summary.interrupted).then_some(spent),

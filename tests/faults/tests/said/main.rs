@@ -200,7 +200,12 @@ fn a_study() {
 fn diff() {
     let place = Place::new(FAN_OUT);
     place.run(0);
-    place.says("diff-same", &["diff", "workflow.yaml", "workflow.yaml"]);
+    place.says("diff-itself", &["diff", "workflow.yaml", "workflow.yaml"]);
+    let text = format!("plyflow: 1\nname: same\n{FAN_OUT}");
+    std::fs::write(place.0.path().join("same.yaml"), text).unwrap();
+    let ran = place.call(&["run", "same.yaml", "--quiet", "--no-report"]);
+    assert_eq!(ran.status.code(), Some(0));
+    place.says("diff-same", &["diff", "workflow.yaml", "same.yaml"]);
     let other = FAN_OUT
         .replace("value: 5", "value: 6")
         .replace("items: 3", "items: 2");

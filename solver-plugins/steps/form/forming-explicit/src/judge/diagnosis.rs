@@ -75,14 +75,24 @@ pub fn source(forming: &Forming, row: &HistoryRow) -> Option<String> {
 /// Kinetic over internal energy at the end above which something still moves. Parts at rest between diaphragms have 1e-9 to 5e-5.
 const AT_REST: f64 = 1e-4;
 
+/// The least settling time that is advised (s).
+const LEAST_SETTLING: f64 = 0.1;
+
+/// The settling time (s) that is advised where this one was too short.
+fn longer(settling: f64) -> f64 {
+    (2.0 * settling).max(LEAST_SETTLING)
+}
+
 /// What to say of a part that has not come to rest between its diaphragms, with this `ratio` of kinetic to internal energy. A press ends its stroke in motion.
 pub fn still_moving(forming: &Forming, ratio: f64) -> Option<String> {
     (forming.load.press().is_none() && ratio > AT_REST).then(|| {
+        let longer = longer(forming.load.settling());
         format!(
             "the run has ended while the part was moving: kinetic energy is {:.1e} of internal energy, and {AT_REST:.0e} at most at rest. A sheet \
-             slips or snaps there, so what the end shows is not the end.{} Try a longer settling_time, 100 ms for instance",
+             slips or snaps there, so what the end shows is not the end.{} Try a longer settling_time, {:.0} ms for instance",
             ratio,
-            fastest(forming)
+            fastest(forming),
+            1e3 * longer
         )
     })
 }
@@ -292,6 +302,17 @@ mod tests {
             ..HistoryRow::default()
         };
         (0..rows).map(row).collect()
+    }
+
+    #[test]
+    fn the_settling_time_that_is_advised_is_longer_than_the_one_that_was_too_short() {
+        assert_eq!(longer(0.04), 0.1);
+        for given in [0.0, 0.06, 0.1, 0.5] {
+            assert!(
+                longer(given) >= 1.5 * given && longer(given) > given,
+                "{given}"
+            );
+        }
     }
 
     #[test]

@@ -63,6 +63,11 @@ impl Cycle {
         self.durations.iter().sum()
     }
 
+    /// Time to come to rest, the last phase (s).
+    pub fn settling(&self) -> f64 {
+        self.durations[3]
+    }
+
     /// When the cavity closes and drawing starts (s).
     pub fn sealed_at(&self) -> f64 {
         self.durations[0] + self.durations[1]

@@ -59,6 +59,14 @@ impl Load {
         }
     }
 
+    /// Time to come to rest at the end (s).
+    pub fn settling(&self) -> f64 {
+        match self {
+            Self::Process { cycle, .. } | Self::Given { cycle, .. } => cycle.settling(),
+            Self::Press(p) => p.stroke.settling,
+        }
+    }
+
     /// Name of the phase at `t`.
     pub fn phase(&self, t: f64) -> &'static str {
         match self {

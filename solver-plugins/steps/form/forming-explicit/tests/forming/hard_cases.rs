@@ -144,7 +144,7 @@ fn a_part_that_the_end_finds_in_motion_is_told_with_what_moves_fastest() {
     assert!(ratio > 1e-4, "{ratio:.1e}");
     let told = told_to_move(&outcome).expect("a warning");
     assert!(
-        told.contains("Fastest: '") && told.contains("settling_time"),
+        told.contains("Fastest: '") && told.contains("settling_time, 100 ms"),
         "{told}"
     );
 }
