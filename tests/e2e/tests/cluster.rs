@@ -202,7 +202,7 @@ fn an_optimisation_keeps_its_allocation_from_round_to_round_and_under_another_he
     let text = |ledger: &str| {
         format!(
             "optimise:\n  minimise: r\n  over: {{x: {{from: 0, to: 4}}}}\n  method: simplex\n  budget: 10\n\
-             steps:\n  a: {{plugin: patient, with: {{value: \"(${{x}} - 1) * (${{x}} - 1)\", seconds: 0.3, ledger: {ledger}}}}}\n\
+             steps:\n  a: {{plugin: patient, with: {{value: \"(${{x}} - 1.3) * (${{x}} - 1.3)\", seconds: 0.3, ledger: {ledger}}}}}\n\
              responses:\n  r: {{step: a, result: value}}\n"
         )
     };
