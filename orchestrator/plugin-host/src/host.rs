@@ -134,15 +134,20 @@ impl<'a, 'w> HostState<'a, 'w> {
         }
     }
 
-    /// The private folder, made on the first call.
+    /// The private folder, made on the first call. Where it cannot be made the step fails of that, as of a write that is refused, and not
+    /// of what the plugin then finds missing: a failing disk is no fault of the plugin's.
     pub(crate) fn scratch(&self) -> &str {
         self.scratch.get_or_init(|| {
             if let Err(e) = std::fs::create_dir_all(&self.job.scratch) {
-                let text = format!(
+                let message = format!(
                     "the scratch folder {} cannot be made: {e}",
                     self.job.scratch
                 );
-                self.emitter.log(LogLevel::Error, &text);
+                self.emitter.log(LogLevel::Error, &message);
+                let kind = ErrorKind::Io;
+                self.output()
+                    .refused
+                    .get_or_insert(ArtifactError { kind, message });
             }
             self.job.scratch.to_string()
         })

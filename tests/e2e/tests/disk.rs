@@ -20,8 +20,22 @@ const COUNT: u64 = 4;
 /// One step after the other, so that operations have the same order each time.
 const RUN: [&str; 3] = ["run", "--jobs", "1"];
 
-/// The next run on a sound disk has nothing to do again, and leaves the same as one that nothing ever disturbed.
-fn heals(lab: &Lab, expected: &BTreeMap<String, Vec<u8>>, about: &str) {
+/// What a run has said that it keeps as damaged, in the store: a journal that could not be read or written, for instance.
+fn said_to_be_kept(text: &str) -> Vec<String> {
+    let behind = text.split("it is kept as ").skip(1);
+    let path = |rest: &str| {
+        rest.split([',', '\n'])
+            .next()
+            .unwrap_or_default()
+            .to_owned()
+    };
+    let inside = |path: String| Some(path.split_once("/.plyflow/")?.1.to_owned());
+    behind.map(path).filter_map(inside).collect()
+}
+
+/// The next run on a sound disk has nothing to do again, and leaves the same as one that nothing ever disturbed, but for what was said to
+/// be `kept`.
+fn heals(lab: &Lab, expected: &BTreeMap<String, Vec<u8>>, kept: &[String], about: &str) {
     let visible = lab.study.artifacts();
     let store = lab.study.path(".plyflow");
     for (name, bytes) in &visible {
@@ -30,9 +44,12 @@ fn heals(lab: &Lab, expected: &BTreeMap<String, Vec<u8>>, about: &str) {
             "{about}: {name} is not whole"
         );
     }
-    let told = lab.study.call(&["verify"]);
-    let text = told_by(&told);
-    assert_eq!(told.status.code(), Some(0), "{about}: verify: {text}");
+    // The first operation makes the store.
+    if store.is_dir() {
+        let told = lab.study.call(&["verify"]);
+        let text = told_by(&told);
+        assert_eq!(told.status.code(), Some(0), "{about}: verify: {text}");
+    }
     // One that could not be placed is done too.
     let unplaced = std::fs::read_dir(store.join("runs/study/unplaced"));
     let unplaced = unplaced.into_iter().flatten().flatten();
@@ -46,7 +63,8 @@ fn heals(lab: &Lab, expected: &BTreeMap<String, Vec<u8>>, about: &str) {
     let wanted = well(COUNT - finished, finished);
     assert_eq!(end, wanted, "{about}: {}", told_by(&output));
     assert!(lab.study.artifacts() == *expected, "{about}: other bytes");
-    let left = leftovers(&lab.study.path(""), &store);
+    let mut left = leftovers(&lab.study.path(""), &store);
+    left.retain(|file| !kept.iter().any(|k| k.starts_with(file)));
     assert!(left.is_empty(), "{about}: left behind: {left:?}");
     let told = lab.study.call(&["verify"]);
     assert_eq!(told.status.code(), Some(0), "{about}: {}", told_by(&told));
@@ -152,7 +170,7 @@ fn fail(errno: i32, once: bool, sample: usize) {
             other => panic!("{about}: code {other:?}: {text}"),
         }
         lab.disk.reset();
-        heals(&lab, &calm.artifacts, &about);
+        heals(&lab, &calm.artifacts, &said_to_be_kept(&text), &about);
     }
 }
 
@@ -194,7 +212,7 @@ fn a_kill_at_any_operation_on_a_file_loses_nothing_shows_nothing_partial_and_lea
             );
             wait_for("the workers' end", || workers_of(head.id()) == 0);
             lab.disk.reset();
-            heals(&lab, &calm.artifacts, &about);
+            heals(&lab, &calm.artifacts, &[], &about);
         }
     }
 }

@@ -117,6 +117,21 @@ fn results_attributes_and_record_are_written_by_a_trivial_step() {
 }
 
 #[test]
+fn a_scratch_folder_that_cannot_be_made_is_why_the_step_fails() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut mesh = job(&dir, "mesh", "forming", json!({"points": 8, "frames": 3}));
+    std::fs::write(dir.path().join("file"), "").unwrap();
+    let inside = dir.path().join("file/scratch");
+    mesh.scratch = inside.to_str().unwrap().into();
+    let (kind, message) = failed(&mesh);
+    assert_eq!(kind, FailureKind::Error, "{message}");
+    assert!(
+        message.contains("the scratch folder") && message.contains("Not a directory"),
+        "{message}"
+    );
+}
+
+#[test]
 fn several_inputs_arrive_at_one_port_in_order() {
     let dir = tempfile::tempdir().unwrap();
     let one = job(&dir, "trivial", "test", json!({"value": 2.0}));
