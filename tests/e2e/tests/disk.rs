@@ -146,7 +146,13 @@ fn says(errno: i32) -> [&'static str; 2] {
 /// Runs with a disk that fails from each operation on (for good, or with this one alone).
 fn fail(errno: i32, once: bool, sample: usize) {
     let calm = undisturbed();
-    for from in calm.sample(sample, errno.unsigned_abs() as usize) {
+    let tried: Vec<u64> = calm.sample(sample, errno.unsigned_abs() as usize).collect();
+    println!(
+        "errno {errno}, once: {once}: {} of {} operations",
+        tried.len(),
+        calm.count
+    );
+    for from in tried {
         let lab = Lab::new(STEPS);
         let about = format!(
             "errno {errno} from operation {from} of {}, once: {once}",
