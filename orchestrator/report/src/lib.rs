@@ -9,6 +9,7 @@
 mod draw;
 mod family;
 mod input;
+mod judge;
 mod page;
 mod plain;
 mod read;
@@ -18,9 +19,13 @@ mod units;
 pub use draw::DrawError;
 pub use family::{Family, Fate, Origin, Point, Response, Sampled, Value, Variable};
 pub use input::{Expectation, Instance, ReportInput, Verdict};
+pub use judge::{
+    Finding, Judged, Kept, allowed_text, failing, found_text, in_short, judge, reasons,
+    table as limit_table,
+};
 pub use read::{COUNTS, Measure, OfClass, TARGETS, Way, Ways, advice, ways};
 pub use summary::summary;
-pub use units::bytes;
+pub use units::{bytes, in_users_units};
 
 use camino::{Utf8Path, Utf8PathBuf};
 use draw::Sharpness;
