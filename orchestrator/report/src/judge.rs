@@ -14,7 +14,9 @@ use crate::family::Fate;
 use crate::input::ReportInput;
 use crate::read::{Material, Study};
 use governed::Governed;
+use plyflow_model::artifact::Cause;
 use plyflow_model::workflow::{LimitOn, Limits};
+use std::cmp::Ordering;
 
 /// How a limit fared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,6 +56,10 @@ pub struct Finding {
     pub value: f64,
     /// The run that has it, for people.
     pub by: String,
+    /// What most likely brought a wrinkle about, where that is known.
+    pub cause: Option<Cause>,
+    /// Mean shear angle along a wrinkle's crest, where that is known (rad).
+    pub crest_shear: Option<f64>,
 }
 
 impl Finding {
@@ -190,6 +196,25 @@ fn of_run(input: &ReportInput, limits: &Limits) -> Vec<Judged> {
             _ => fields.evidence(on, &governed),
         }));
     }
+    all
+}
+
+/// The wrinkles by their heights and the bridging by its gaps that were found, each the largest first: what is told where there are no limits.
+pub(crate) fn largest(input: &ReportInput, material: &Material) -> Vec<(LimitOn, Finding)> {
+    let none = Limits::default();
+    let mut all = Vec::new();
+    for on in [LimitOn::WrinkleHeight, LimitOn::BridgingGap] {
+        for study in judged_studies(material) {
+            let evidence = defects::Look::new(input, material, study).evidence(on, &none);
+            let named = evidence.findings.into_iter().filter(|f| f.name.is_some());
+            all.extend(named.map(|f| (on, f)));
+        }
+    }
+    all.sort_by(|a, b| {
+        (a.0, b.1.value)
+            .partial_cmp(&(b.0, a.1.value))
+            .unwrap_or(Ordering::Equal)
+    });
     all
 }
 

@@ -13,9 +13,7 @@ use crate::exit;
 use crate::said::{Done, Stop, print};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::job::Record;
-use plyflow_report::{
-    Expectation, Instance, Kept, ReportInput, is_current, judge, write_report,
-};
+use plyflow_report::{Expectation, Instance, Kept, ReportInput, is_current, judge, write_report};
 
 /// `plyflow report`.
 ///

@@ -84,12 +84,11 @@ fn limits_text(judged: &[Judged]) -> String {
         return String::new();
     };
     let (head, lines) = limit_table(judged);
-    let reasons = reasons(judged).iter().map(|r| format!("{r}\n"));
-    format!(
-        "limits: {text}\n{}{}\n",
-        table(&head, &lines, &[]),
-        reasons.collect::<String>()
-    )
+    let mut out = format!("limits: {text}\n{}", table(&head, &lines, &[]));
+    for line in reasons(judged) {
+        out += &(line + "\n");
+    }
+    out + "\n"
 }
 
 /// A table of what the steps cost.
@@ -203,7 +202,10 @@ fn as_csv(rows: &[Row], judged: &[Judged]) -> String {
 
 /// A limit as a row of the table for programs: its step is `limits`, its item the place for which it holds.
 fn limit_cells(j: &Judged) -> [String; 12] {
-    let of = [Some(j.of.as_str()).filter(|of| !of.is_empty()), j.place.as_deref()];
+    let of = [
+        Some(j.of.as_str()).filter(|of| !of.is_empty()),
+        j.place.as_deref(),
+    ];
     let of: Vec<&str> = of.into_iter().flatten().collect();
     let bound = |is_least| match (j.on == LimitOn::ShearNegative) == is_least {
         true => j.limit.to_string(),
@@ -269,7 +271,10 @@ pub fn results(args: &ResultsArgs) -> Done {
         return concluded(told, &damages, &args.workflow);
     }
     let told = match args.format {
-        Format::Json => print(&format!("{:#}\n", as_json(&session, &rows, &records, &judged))),
+        Format::Json => print(&format!(
+            "{:#}\n",
+            as_json(&session, &rows, &records, &judged)
+        )),
         Format::Csv => print(&as_csv(&rows, &judged)),
         Format::Table if records.is_empty() && !damages.is_empty() => Ok(()),
         Format::Table if records.is_empty() => {
@@ -299,7 +304,13 @@ fn told_by(
         rows: Vec::new(),
     };
     let page = beside(&opened.workflow.file, &[]);
-    input(opened, session, &found, &[], (&args.workflow, &[][..], page.as_path()))
+    input(
+        opened,
+        session,
+        &found,
+        &[],
+        (&args.workflow, &[][..], page.as_path()),
+    )
 }
 
 /// `plyflow results --front`, of the comparisons among `records`.

@@ -12,7 +12,8 @@ use crate::said::{Done, Stop, print};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::job::Record;
 use plyflow_report::{
-    Judged,     Family, Fate, Origin, Point, ReportInput, Response, Sampled, Value, Variable, write_report,
+    Family, Fate, Judged, Origin, Point, ReportInput, Response, Sampled, Value, Variable,
+    write_report,
 };
 use plyflow_workflow::resolved::{ResponseFrom, Study, StudyResponse, StudyValue};
 

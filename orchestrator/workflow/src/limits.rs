@@ -4,7 +4,6 @@ use crate::diagnostics::{Problems, Source};
 use crate::resolved::ResolvedStep;
 use crate::yaml::{Kind, Node};
 use plyflow_model::workflow::{LimitPlace, Limits};
-use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Plies and regions of the scenes of some steps: of each ply the names of its regions.
@@ -145,6 +144,7 @@ fn named(node: &Node, place: &LimitPlace, plies: &Plies, source: &Source, proble
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::Value;
 
     #[test]
     fn plies_and_their_regions_are_those_of_every_scene() {

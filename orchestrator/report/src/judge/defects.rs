@@ -69,10 +69,7 @@ impl<'a> Look<'a> {
         };
         let mut all = Evidence::default();
         let judged = |d: &&ComparedDefect| {
-            matches!(
-                c.told.role(&d.model),
-                Some(Role::Local | Role::Reference)
-            )
+            matches!(c.told.role(&d.model), Some(Role::Local | Role::Reference))
         };
         for d in c.told.defects.iter().filter(judged) {
             let Some(value) = value(on, &d.found, d.length) else {
@@ -91,6 +88,8 @@ impl<'a> Look<'a> {
                 at: d.found.centre,
                 value,
                 by: d.model.clone(),
+                cause: d.found.cause,
+                crest_shear: d.found.ridge_shear,
             });
         }
         let at = self.input.instances.iter();
@@ -99,14 +98,19 @@ impl<'a> Look<'a> {
         all.open.extend(too_small(on, limits, parameters, &c.label));
         self.zones_without_runs(&mut all);
         if let Some(missed) = c.missed_text() {
-            all.open.push(format!("no local run has {missed} of the reference"));
+            all.open
+                .push(format!("no local run has {missed} of the reference"));
         }
         for local in &self.study.locals {
             self.bending(on, &local.run, &mut all);
         }
         let fine = self.study.locals.len();
         if fine > 0 {
-            all.by.push(plural(fine, "fine run in its zone", "fine runs in their zones"));
+            all.by.push(plural(
+                fine,
+                "fine run in its zone",
+                "fine runs in their zones",
+            ));
         }
         self.elsewhere(on, limits, &mut all);
         all.open.dedup();
@@ -124,14 +128,16 @@ impl<'a> Look<'a> {
             .collect();
         if !without.is_empty() {
             let names = without.join(", ");
-            all.open.push(format!("there is no fine run of zone {names}"));
+            all.open
+                .push(format!("there is no fine run of zone {names}"));
         }
     }
 
     /// What the detection says of what lies outside of the zones.
     fn elsewhere(&self, on: LimitOn, limits: &Limits, all: &mut Evidence) {
         let Some(detection) = &self.study.detection else {
-            all.open.push("no detection has looked at what lies outside of the zones".into());
+            all.open
+                .push("no detection has looked at what lies outside of the zones".into());
             return;
         };
         if let Some(why) = &self.flagged.unread {
@@ -167,6 +173,8 @@ impl<'a> Look<'a> {
                 at: *at,
                 value: *distance,
                 by: whole.to_owned(),
+                cause: None,
+                crest_shear: None,
             });
         }
     }
@@ -174,7 +182,9 @@ impl<'a> Look<'a> {
     /// By a measurement of the plies of the whole.
     fn measured(&self, at: usize, on: LimitOn, limits: &Limits) -> Evidence {
         let label = self.input.instances[at].label();
-        let told = self.material.facts[at].as_ref().map(|f| &f.attributes["defects"]);
+        let told = self.material.facts[at]
+            .as_ref()
+            .map(|f| &f.attributes["defects"]);
         let read = told.map(|d| serde_json::from_value::<Vec<MeasuredDefect>>(d.clone()));
         let list = match read {
             Some(Ok(list)) => list,
@@ -198,6 +208,8 @@ impl<'a> Look<'a> {
                 at: d.found.centre,
                 value,
                 by: label.clone(),
+                cause: d.found.cause,
+                crest_shear: d.found.ridge_shear,
             }));
         }
         all.open
@@ -230,8 +242,7 @@ impl<'a> Look<'a> {
 
     /// Plies whose elements do not bend cannot wrinkle: that they have none says nothing.
     fn bending(&self, on: LimitOn, run: &Run, all: &mut Evidence) {
-        if matches!(on, LimitOn::WrinkleHeight | LimitOn::WrinkleLength)
-            && !bends(self.input, run)
+        if matches!(on, LimitOn::WrinkleHeight | LimitOn::WrinkleLength) && !bends(self.input, run)
         {
             all.open.push(format!(
                 "the elements of {} do not bend, so that it has no wrinkles of its own",

@@ -117,6 +117,8 @@ impl<'a> Look<'a> {
             at,
             value,
             by: looked.run.label.clone(),
+            cause: None,
+            crest_shear: None,
         };
         worst.into_values().map(finding).collect()
     }
@@ -126,7 +128,11 @@ impl<'a> Look<'a> {
         let whole = self.runs.iter().find(|r| r.zone.is_none());
         let mut by = Vec::new();
         if fine > 0 {
-            by.push(plural(fine, "fine run in its zone", "fine runs in their zones"));
+            by.push(plural(
+                fine,
+                "fine run in its zone",
+                "fine runs in their zones",
+            ));
         }
         by.extend(whole.map(|w| match fine {
             0 => w.run.label.clone(),

@@ -119,6 +119,8 @@ mod tests {
             at,
             value,
             by: "run".into(),
+            cause: None,
+            crest_shear: None,
         }
     }
 
@@ -142,7 +144,11 @@ mod tests {
             {"ply": "a", "shear": "60 deg"}, {"ply": "a", "region": "web", "shear": "20 deg"}]});
         let deg = |d: f64| d.to_radians();
         let inside = finding("a", [0.05, 0.05], deg(30.0));
-        let (part, ply, web) = (None, Some("a".to_owned()), Some("region web of a".to_owned()));
+        let (part, ply, web) = (
+            None,
+            Some("a".to_owned()),
+            Some("region web of a".to_owned()),
+        );
         use Kept::{Beyond as B, Within as W};
         assert_eq!(
             verdicts(limits.clone(), &[inside]),
@@ -160,7 +166,10 @@ mod tests {
     fn exactly_the_limit_is_within_and_a_hair_more_is_beyond() {
         let limit = || json!({"wrinkle_height": "1 mm"});
         let with = |v: f64| verdicts(limit(), &[finding("a", [0.0; 2], v)])[0].1;
-        assert_eq!((with(1e-3), with(1.000_001e-3)), (Kept::Within, Kept::Beyond));
+        assert_eq!(
+            (with(1e-3), with(1.000_001e-3)),
+            (Kept::Within, Kept::Beyond)
+        );
     }
 
     #[test]
@@ -177,6 +186,9 @@ mod tests {
         let open = with(vec![finding("a", [0.0; 2], 0.1)]);
         assert_eq!(open.verdict, Kept::NotJudged);
         assert_eq!(open.notes, ["half of it was not looked at"]);
-        assert_eq!(with(vec![finding("a", [0.0; 2], 1.0)]).verdict, Kept::Beyond);
+        assert_eq!(
+            with(vec![finding("a", [0.0; 2], 1.0)]).verdict,
+            Kept::Beyond
+        );
     }
 }

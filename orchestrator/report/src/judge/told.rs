@@ -11,7 +11,10 @@ impl Judged {
     /// What is limited, and where: `wrinkle height (region web)`.
     #[must_use]
     pub fn title(&self) -> String {
-        let of = [Some(self.of.as_str()).filter(|of| !of.is_empty()), self.place.as_deref()];
+        let of = [
+            Some(self.of.as_str()).filter(|of| !of.is_empty()),
+            self.place.as_deref(),
+        ];
         let of: Vec<&str> = of.into_iter().flatten().collect();
         match of.is_empty() {
             true => self.on.words().to_owned(),
@@ -24,7 +27,11 @@ impl Judged {
     pub fn ratio(&self) -> Option<f64> {
         let worst = super::size(self.on, self.worst.as_ref()?.value);
         let limit = super::size(self.on, self.limit);
-        Some(if limit > 0.0 { worst / limit } else { f64::INFINITY })
+        Some(if limit > 0.0 {
+            worst / limit
+        } else {
+            f64::INFINITY
+        })
     }
 }
 
@@ -76,16 +83,32 @@ pub fn in_short(all: &[Judged]) -> Option<(Kept, String)> {
     Some(match (beyond, open) {
         (0, 0) => (
             Kept::Within,
-            format!("within {} where the models have looked", if all.len() == 1 { "its limit" } else { "all limits" }),
+            format!(
+                "within {} where the models have looked",
+                if all.len() == 1 {
+                    "its limit"
+                } else {
+                    "all limits"
+                }
+            ),
         ),
-        (0, n) if n == all.len() => (Kept::NotJudged, format!("not judged: {limits}, none of which could be held against anything whole")),
-        (0, n) => (Kept::NotJudged, format!("not judged: {n} of {limits}; the others are kept")),
+        (0, n) if n == all.len() => (
+            Kept::NotJudged,
+            format!("not judged: {limits}, none of which could be held against anything whole"),
+        ),
+        (0, n) => (
+            Kept::NotJudged,
+            format!("not judged: {n} of {limits}; the others are kept"),
+        ),
         (n, _) => {
             let ratio = |j: &&Judged| j.ratio().unwrap_or(0.0);
             let worst = of(Kept::Beyond).max_by(|a, b| ratio(a).total_cmp(&ratio(b)));
             let worst = worst.and_then(|j| Some(beyond_text(j, j.beyond.first()?)));
             let text = worst.unwrap_or_default();
-            (Kept::Beyond, format!("beyond {n} of {limits}{rest}; worst: {text}"))
+            (
+                Kept::Beyond,
+                format!("beyond {n} of {limits}{rest}; worst: {text}"),
+            )
         }
     })
 }
@@ -118,7 +141,10 @@ pub fn reasons(all: &[Judged]) -> Vec<String> {
                 Kept::NotJudged => Kept::NotJudged,
                 _ => Kept::Within,
             };
-            match told.iter_mut().find(|(k, text, _)| *k == kind && text == note) {
+            match told
+                .iter_mut()
+                .find(|(k, text, _)| *k == kind && text == note)
+            {
                 Some((.., of)) => of.push(j.title()),
                 None => told.push((kind, note, vec![j.title()])),
             }
@@ -163,6 +189,8 @@ mod tests {
             at: [0.12, -0.03],
             value: *v,
             by: "local.A".into(),
+            cause: None,
+            crest_shear: None,
         };
         let found: Vec<Finding> = values.iter().map(finding).collect();
         Judged {
@@ -172,7 +200,11 @@ mod tests {
             limit,
             verdict,
             worst: found.first().cloned(),
-            beyond: if verdict == Kept::Beyond { found } else { vec![] },
+            beyond: if verdict == Kept::Beyond {
+                found
+            } else {
+                vec![]
+            },
             by: "1 fine run in its zone".into(),
             notes: match verdict {
                 Kept::NotJudged => vec!["nobody has looked".into()],
@@ -199,7 +231,10 @@ mod tests {
             failing(&all).unwrap(),
             "2 limits exceeded: wrinkle length, wrinkle height; 1 limit not judged: bridging gap"
         );
-        assert_eq!(reasons(&all), ["not judged: bridging gap: nobody has looked"]);
+        assert_eq!(
+            reasons(&all),
+            ["not judged: bridging gap: nobody has looked"]
+        );
     }
 
     #[test]

@@ -277,7 +277,9 @@ mod tests {
                 unit => json!(format!("0 {unit}")),
             };
             let limits = read(json!({on.name(): value})).unwrap();
-            let stated = LimitOn::ALL.into_iter().filter(|o| limits.part.of(*o).is_some());
+            let stated = LimitOn::ALL
+                .into_iter()
+                .filter(|o| limits.part.of(*o).is_some());
             assert_eq!(stated.collect::<Vec<_>>(), [on]);
         }
     }

@@ -1,0 +1,240 @@
+//! The first screen: is the part good, where is it not, what would help, and can this be trusted.
+
+mod help;
+
+use crate::input::ReportInput;
+use crate::judge::{Finding, Judged, Kept, allowed_text, found_text, in_short, largest, reasons};
+use crate::page::content::Content;
+use crate::page::verdict::{self, Tone};
+use crate::page::warned;
+use crate::units::{plural, quantity};
+use maud::{Markup, html};
+use plyflow_model::workflow::LimitOn;
+
+/// Limits and places that the first screen tells; the rest is below.
+const SHOWN: usize = 6;
+
+/// A place where the part is not good, or has its largest defects.
+pub(super) struct Bad {
+    /// What was found there.
+    pub(super) found: Vec<(LimitOn, Finding)>,
+    /// By how much, in words.
+    text: Vec<String>,
+    /// The largest share of a limit.
+    ratio: f64,
+}
+
+impl Bad {
+    fn title(&self) -> String {
+        self.found[0].1.place()
+    }
+}
+
+/// The first screen of a page that is no study.
+pub(super) fn section(content: &Content<'_>) -> Markup {
+    let (input, material) = (content.input, &content.material);
+    let bad = places(content);
+    let (trust, told) = verdict::trust(material, input);
+    let (tone, headline) = headline(input, trust);
+    let help = help::leads(input, &bad);
+    let warnings = warned::counts(input, material);
+    html! {
+        section id="answer" class=(class(tone)) {
+            p class={ "verdict " (class(tone)) } { (headline) }
+            div class="answers" {
+                div id="good" {
+                    h2 { "Is the part good?" }
+                    (limits(input))
+                }
+                div id="bad-places" {
+                    h2 { @if input.judged.is_empty() { "What was found?" } @else { "Where is it not?" } }
+                    (listed(&bad, input))
+                    @for text in verdict::found(material) { p class="note" { (text) } }
+                }
+                div id="help" {
+                    h2 { "What would help?" }
+                    @if help.is_empty() { p class="note" { "Nothing that the fields of this run speak for." } }
+                    @for lead in help.iter().take(help::SHOWN) { p { b { (lead.advice) } " " span class="note" { (lead.because) } } }
+                    @if !help.is_empty() { p class="note" { "These are leads read from the fields, no proof: run the change and compare." } }
+                }
+                div id="trust" {
+                    h2 { "Can this be trusted?" }
+                    p class={ "state " (class(trust)) } { @match trust {
+                        Tone::Good => "Nothing speaks against it.",
+                        Tone::Found => "With care.",
+                        Tone::Bad => "Not as it is.",
+                    } }
+                    @for text in &told { p { (text) } }
+                    @if !warnings.is_empty() { p { a href="#warnings" { (warnings) } } }
+                }
+            }
+        }
+    }
+}
+
+fn class(tone: Tone) -> &'static str {
+    match tone {
+        Tone::Good => "good",
+        Tone::Found => "found",
+        Tone::Bad => "bad",
+    }
+}
+
+/// The verdict on the part. A run that is not to be trusted has no good part.
+fn headline(input: &ReportInput, trust: Tone) -> (Tone, String) {
+    let doubt = match trust {
+        Tone::Bad => "; but this run is not to be trusted as it is",
+        _ => "",
+    };
+    match in_short(&input.judged) {
+        Some((kept, text)) => {
+            let tone = match (kept, trust) {
+                (Kept::Beyond, _) => Tone::Bad,
+                (Kept::NotJudged, _) | (_, Tone::Bad) => Tone::Found,
+                _ => Tone::Good,
+            };
+            (tone, format!("The part is {text}{doubt}."))
+        }
+        None if input.limits.is_some() => {
+            (Tone::Found, format!("No limit could be judged{doubt}."))
+        }
+        None => (
+            Tone::Found,
+            format!("No limits were given, so nothing is judged{doubt}."),
+        ),
+    }
+}
+
+/// Limits with what was found.
+fn limits(input: &ReportInput) -> Markup {
+    let all = &input.judged;
+    if all.is_empty() {
+        return html! {
+            p { "The workflow states no limits. Give them beside its steps, and this page says whether the part keeps them:" }
+            pre { code { "limits:\n  wrinkle_height: 1 mm\n  bridging_gap: 2 mm\n  shear: 45 deg" } }
+        };
+    }
+    let mut order: Vec<&Judged> = all.iter().collect();
+    // What is beyond its limit first, then what is not judged.
+    order.sort_by_key(|j| match j.verdict {
+        Kept::Beyond => 0,
+        Kept::NotJudged => 1,
+        Kept::Within => 2,
+    });
+    html! {
+        (table(order.iter().take(SHOWN).copied(), false))
+        @if order.len() > SHOWN { p class="note" { a href="#limits" { "All " (order.len()) " limits" } } }
+        @else { p class="note" { a href="#limits" { "Who has looked, and what is not judged" } } }
+    }
+}
+
+/// A table of limits; `whole` also with where and who has looked.
+fn table<'j>(all: impl Iterator<Item = &'j Judged>, whole: bool) -> Markup {
+    html! {
+        div class="scroll" { table class="limits" {
+            thead { tr { th { "limit" } th class="n" { "allowed" } th class="n" { "worst found" } th { "verdict" }
+                @if whole { th { "where" } th { "who has looked" } } } }
+            tbody { @for j in all { tr {
+                th { (j.title()) } td class="n" { (allowed_text(j)) } td class="n" { (found_text(j)) } (verdict_cell(j))
+                @if whole {
+                    td { @if let Some(f) = &j.worst { (f.place()) } }
+                    td { (j.by) }
+                }
+            } } }
+        } }
+    }
+}
+
+fn verdict_cell(j: &Judged) -> Markup {
+    let (class, text) = match j.verdict {
+        Kept::Within => ("met", "✓ within"),
+        Kept::Beyond => ("missed", "✗ beyond"),
+        Kept::NotJudged => ("open", "– not judged"),
+    };
+    html! { td class=(class) { (text) } }
+}
+
+/// All limits, who has looked, and what is not judged and why.
+pub(super) fn all_limits(input: &ReportInput) -> Markup {
+    /// Rows of the table.
+    const LONGEST: usize = 400;
+    let all = &input.judged;
+    html! {
+        @if !all.is_empty() {
+            section id="limits" {
+                h2 { "Limits" }
+                p { "A limit is judged where the finest model has looked: in the zones by their fine runs, elsewhere by the run of the whole part."
+                    @if let Some(source) = input.limits.as_ref().and_then(|l| l.source.as_ref()) { " The limits come from: " (source) "." } }
+                @if all.len() > LONGEST { p class="note" { "The first " (LONGEST) " of " (all.len()) "." } }
+                (table(all.iter().take(LONGEST), true))
+                @let told = reasons(all);
+                @if !told.is_empty() { ul { @for line in told.iter().take(LONGEST) { li { (line) } } } }
+            }
+        }
+    }
+}
+
+/// Places beyond limits, the worst first; without limits the largest defects.
+fn places(content: &Content<'_>) -> Vec<Bad> {
+    let input = content.input;
+    if input.judged.is_empty() {
+        let all = largest(input, &content.material).into_iter();
+        return all
+            .map(|(on, f)| Bad {
+                text: vec![format!(
+                    "{} {}",
+                    on.words(),
+                    quantity(f.value, on.unit(), 3)
+                )],
+                found: vec![(on, f)],
+                ratio: 0.0,
+            })
+            .collect();
+    }
+    let mut all: Vec<Bad> = Vec::new();
+    for j in input.judged.iter().filter(|j| j.verdict == Kept::Beyond) {
+        for f in &j.beyond {
+            let size = crate::judge::size(j.on, f.value);
+            let limit = crate::judge::size(j.on, j.limit);
+            let ratio = if limit > 0.0 {
+                size / limit
+            } else {
+                f64::INFINITY
+            };
+            let of = format!(
+                "{} {} ({})",
+                j.on.words(),
+                quantity(f.value, j.on.unit(), 3),
+                allowed_text(j)
+            );
+            let same = |b: &&mut Bad| b.found[0].1.name.is_some() && b.title() == f.place();
+            match all.iter_mut().find(same) {
+                Some(b) => {
+                    b.found.push((j.on, f.clone()));
+                    b.text.push(of);
+                    b.ratio = b.ratio.max(ratio);
+                }
+                None => all.push(Bad {
+                    found: vec![(j.on, f.clone())],
+                    text: vec![of],
+                    ratio,
+                }),
+            }
+        }
+    }
+    all.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
+    all
+}
+
+fn listed(bad: &[Bad], input: &ReportInput) -> Markup {
+    html! {
+        @if bad.is_empty() {
+            p { @if input.judged.is_empty() { "No wrinkle and no bridging was measured." } @else { "Nothing that was found is beyond its limit." } }
+        } @else {
+            ol class="places-bad" { @for b in bad.iter().take(SHOWN) {
+                li { b { (b.title()) } ": " (b.text.join(", ")) }
+            } }
+            @if bad.len() > SHOWN { p class="note" { (plural(bad.len() - SHOWN, "more place is", "more places are")) " in the tables below." } }
+        }
+    }
+}
