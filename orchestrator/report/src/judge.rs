@@ -56,6 +56,8 @@ pub struct Finding {
     pub value: f64,
     /// The run that has it, for people.
     pub by: String,
+    /// Whether it reaches the cut of its zone, so that it may be larger than it is told.
+    pub at_cut: bool,
     /// What most likely brought a wrinkle about, where that is known.
     pub cause: Option<Cause>,
     /// Mean shear angle along a wrinkle's crest, where that is known (rad).

@@ -123,7 +123,7 @@ fn header(content: &Content<'_>, study: Option<&Shown<'_>>, large: bool) -> Mark
             }
             @if let Some((kept, text)) = in_short(&input.judged).filter(|_| apart) {
                 @let tone = match kept { Kept::Within => Tone::Good, Kept::Beyond => Tone::Bad, Kept::NotJudged => Tone::Found };
-                p class={ "verdict " (class(tone)) } { "Over all points: " (text) }
+                p class={ "verdict " (class(tone)) } { "Over all points, the part " (text) "." }
             }
             @if !input.failures.is_empty() && study.is_none() {
                 section class="warnings bad" id="failures" {

@@ -51,7 +51,7 @@ fn limit_block(input: &ReportInput) -> Option<String> {
     let (_, text) = in_short(&input.judged)?;
     let (head, rows) = limit_table(&input.judged);
     let more = rows.len().saturating_sub(LONGEST);
-    let mut out = format!("limits: {text}\n");
+    let mut out = format!("the part {text}\n");
     out += &table(&head, &rows[..rows.len() - more], &[]);
     if more > 0 {
         out += &format!("{more} more limits are in the report\n");

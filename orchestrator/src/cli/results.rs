@@ -84,7 +84,7 @@ fn limits_text(judged: &[Judged]) -> String {
         return String::new();
     };
     let (head, lines) = limit_table(judged);
-    let mut out = format!("limits: {text}\n{}", table(&head, &lines, &[]));
+    let mut out = format!("the part {text}\n{}", table(&head, &lines, &[]));
     for line in reasons(judged) {
         out += &(line + "\n");
     }

@@ -75,12 +75,6 @@ impl<'a> Look<'a> {
             let Some(value) = value(on, &d.found, d.length) else {
                 continue;
             };
-            if d.touches_cut {
-                all.open.push(format!(
-                    "{} reaches the cut of zone {} and may go on: raise `scale` of `zone-extraction`",
-                    d.id, d.zone
-                ));
-            }
             all.findings.push(Finding {
                 name: Some(d.id.clone()),
                 ply: d.ply.clone(),
@@ -88,6 +82,7 @@ impl<'a> Look<'a> {
                 at: d.found.centre,
                 value,
                 by: d.model.clone(),
+                at_cut: d.touches_cut,
                 cause: d.found.cause,
                 crest_shear: d.found.ridge_shear,
             });
@@ -113,7 +108,6 @@ impl<'a> Look<'a> {
             ));
         }
         self.elsewhere(on, limits, &mut all);
-        all.open.dedup();
         all
     }
 
@@ -173,6 +167,7 @@ impl<'a> Look<'a> {
                 at: *at,
                 value: *distance,
                 by: whole.to_owned(),
+                at_cut: false,
                 cause: None,
                 crest_shear: None,
             });
@@ -208,6 +203,7 @@ impl<'a> Look<'a> {
                 at: d.found.centre,
                 value,
                 by: label.clone(),
+                at_cut: false,
                 cause: d.found.cause,
                 crest_shear: d.found.ridge_shear,
             }));

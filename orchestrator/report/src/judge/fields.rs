@@ -117,6 +117,7 @@ impl<'a> Look<'a> {
             at,
             value,
             by: looked.run.label.clone(),
+            at_cut: false,
             cause: None,
             crest_shear: None,
         };

@@ -79,17 +79,15 @@ impl<'a> Governed<'a> {
         let mut found: Vec<Finding> = evidence.findings.iter().filter(mine).cloned().collect();
         found.sort_by(|a, b| size(on, b.value).total_cmp(&size(on, a.value)));
         let worst = found.first().cloned();
+        let mut open = evidence.open.clone();
+        open.extend(at_cuts(&found));
         // The texts of YAML are rounded once when they are read: a value that is the limit is not beyond it.
         let most = size(on, limit) * (1.0 + 1e-12);
         found.retain(|f| size(on, f.value) > most);
-        let verdict = match (found.is_empty(), evidence.open.is_empty()) {
+        let verdict = match (found.is_empty(), open.is_empty()) {
             (false, _) => Kept::Beyond,
             (true, false) => Kept::NotJudged,
             (true, true) => Kept::Within,
-        };
-        let notes = match verdict {
-            Kept::NotJudged => &evidence.open,
-            _ => &evidence.notes,
         };
         Judged {
             of: of.to_owned(),
@@ -100,9 +98,29 @@ impl<'a> Governed<'a> {
             worst,
             beyond: found,
             by: evidence.by.join("; "),
-            notes: notes.clone(),
+            notes: match verdict {
+                Kept::NotJudged => open,
+                _ => evidence.notes.clone(),
+            },
         }
     }
+}
+
+/// What is said of defects that go on beyond what was looked at.
+fn at_cuts(found: &[Finding]) -> Option<String> {
+    let mut names: Vec<&str> = Vec::new();
+    for f in found.iter().filter(|f| f.at_cut) {
+        names.extend(f.name.as_deref().filter(|n| !names.contains(n)));
+    }
+    let (verb, zones) = match names.len() {
+        0 => return None,
+        1 => ("reaches", "its zone"),
+        _ => ("reach", "their zones"),
+    };
+    Some(format!(
+        "{} {verb} the cut of {zones} and may go on: raise `scale` of `zone-extraction`",
+        names.join(", ")
+    ))
 }
 
 #[cfg(test)]
@@ -119,6 +137,7 @@ mod tests {
             at,
             value,
             by: "run".into(),
+            at_cut: false,
             cause: None,
             crest_shear: None,
         }
@@ -189,6 +208,17 @@ mod tests {
         assert_eq!(
             with(vec![finding("a", [0.0; 2], 1.0)]).verdict,
             Kept::Beyond
+        );
+    }
+    #[test]
+    fn a_defect_that_reaches_the_cut_leaves_open_the_limit_of_its_own_place_alone() {
+        let mut at_cut = finding("a", [0.05, 0.05], 1e-4);
+        (at_cut.name, at_cut.at_cut) = (Some("AW1".into()), true);
+        let limits = json!({"wrinkle_height": "1 mm", "places": [{"region": "web", "wrinkle_height": "1 mm"}]});
+        let web = Some("region web".to_owned());
+        assert_eq!(
+            verdicts(limits, &[at_cut]),
+            [(None, Kept::Within), (web, Kept::NotJudged)]
         );
     }
 }

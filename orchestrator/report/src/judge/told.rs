@@ -55,10 +55,10 @@ pub fn found_text(j: &Judged) -> String {
     }
 }
 
-/// A finding beyond its limit, in words: `wrinkle height 2.1 mm (at most 1 mm): AW1 on ply_1, zone A at ..`.
+/// A finding beyond its limit, in words: `wrinkle height 2.1 mm (at most 1 mm), AW1 on ply_1, zone A at ..`.
 fn beyond_text(j: &Judged, f: &Finding) -> String {
     format!(
-        "{} {} ({}): {}",
+        "{} {} ({}), {}",
         j.title(),
         quantity(f.value, j.on.unit(), DIGITS),
         allowed_text(j),
@@ -66,7 +66,7 @@ fn beyond_text(j: &Judged, f: &Finding) -> String {
     )
 }
 
-/// Whether the part is good, in a sentence; `None` without limits.
+/// Whether the part is good, in a sentence without its subject; `None` without limits.
 #[must_use]
 pub fn in_short(all: &[Judged]) -> Option<(Kept, String)> {
     let of = |v| all.iter().filter(move |j| j.verdict == v);
@@ -78,27 +78,24 @@ pub fn in_short(all: &[Judged]) -> Option<(Kept, String)> {
     }
     let rest = match open {
         0 => String::new(),
-        n => format!("; {n} not judged"),
+        n => format!(" ({n} not judged)"),
+    };
+    let own = match all.len() {
+        1 => "its limit",
+        _ => "all its limits",
     };
     Some(match (beyond, open) {
         (0, 0) => (
             Kept::Within,
-            format!(
-                "within {} where the models have looked",
-                if all.len() == 1 {
-                    "its limit"
-                } else {
-                    "all limits"
-                }
-            ),
+            format!("keeps {own} where the models have looked"),
         ),
         (0, n) if n == all.len() => (
             Kept::NotJudged,
-            format!("not judged: {limits}, none of which could be held against anything whole"),
+            format!("is not judged: none of {limits} could be"),
         ),
         (0, n) => (
             Kept::NotJudged,
-            format!("not judged: {n} of {limits}; the others are kept"),
+            format!("is not judged by {n} of {limits}; it keeps the others"),
         ),
         (n, _) => {
             let ratio = |j: &&Judged| j.ratio().unwrap_or(0.0);
@@ -107,7 +104,7 @@ pub fn in_short(all: &[Judged]) -> Option<(Kept, String)> {
             let text = worst.unwrap_or_default();
             (
                 Kept::Beyond,
-                format!("beyond {n} of {limits}{rest}; worst: {text}"),
+                format!("exceeds {n} of {limits}{rest}; worst: {text}"),
             )
         }
     })
@@ -189,6 +186,7 @@ mod tests {
             at: [0.12, -0.03],
             value: *v,
             by: "local.A".into(),
+            at_cut: false,
             cause: None,
             crest_shear: None,
         };
@@ -225,7 +223,7 @@ mod tests {
         assert_eq!(kept, Kept::Beyond);
         assert_eq!(
             text,
-            "beyond 2 of 4 limits; 1 not judged; worst: wrinkle height 2.1 mm (at most 1 mm): AW1 on ply_1, zone A at x = 120 mm, y = -30 mm"
+            "exceeds 2 of 4 limits (1 not judged); worst: wrinkle height 2.1 mm (at most 1 mm), AW1 on ply_1, zone A at x = 120 mm, y = -30 mm"
         );
         assert_eq!(
             failing(&all).unwrap(),

@@ -7,8 +7,11 @@ use crate::judge::{Finding, Judged, Kept, allowed_text, found_text, in_short, la
 use crate::page::content::Content;
 use crate::page::verdict::{self, Tone};
 use crate::page::warned;
+use crate::plain::id_of;
+use crate::read::Study;
 use crate::units::{plural, quantity};
 use maud::{Markup, html};
+use plyflow_model::artifact::ComparedDefect;
 use plyflow_model::workflow::LimitOn;
 
 /// Limits and places that the first screen tells; the rest is below.
@@ -48,13 +51,13 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
                 }
                 div id="bad-places" {
                     h2 { @if input.judged.is_empty() { "What was found?" } @else { "Where is it not?" } }
-                    (listed(&bad, input))
+                    (listed(&bad, content))
                     @for text in verdict::found(material) { p class="note" { (text) } }
                 }
                 div id="help" {
                     h2 { "What would help?" }
                     @if help.is_empty() { p class="note" { "Nothing that the fields of this run speak for." } }
-                    @for lead in help.iter().take(help::SHOWN) { p { b { (lead.advice) } " " span class="note" { (lead.because) } } }
+                    @for lead in help.iter().take(help::SHOWN) { p { b { (lead.advice) } " " span class="note" { (with_code(&lead.because)) } } }
                     @if !help.is_empty() { p class="note" { "These are leads read from the fields, no proof: run the change and compare." } }
                 }
                 div id="trust" {
@@ -64,7 +67,7 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
                         Tone::Found => "With care.",
                         Tone::Bad => "Not as it is.",
                     } }
-                    @for text in &told { p { (text) } }
+                    @for text in &told { p { (with_code(text)) } }
                     @if !warnings.is_empty() { p { a href="#warnings" { (warnings) } } }
                 }
             }
@@ -93,7 +96,7 @@ fn headline(input: &ReportInput, trust: Tone) -> (Tone, String) {
                 (Kept::NotJudged, _) | (_, Tone::Bad) => Tone::Found,
                 _ => Tone::Good,
             };
-            (tone, format!("The part is {text}{doubt}."))
+            (tone, format!("The part {text}{doubt}."))
         }
         None if input.limits.is_some() => {
             (Tone::Found, format!("No limit could be judged{doubt}."))
@@ -168,7 +171,7 @@ pub(super) fn all_limits(input: &ReportInput) -> Markup {
                 @if all.len() > LONGEST { p class="note" { "The first " (LONGEST) " of " (all.len()) "." } }
                 (table(all.iter().take(LONGEST), true))
                 @let told = reasons(all);
-                @if !told.is_empty() { ul { @for line in told.iter().take(LONGEST) { li { (line) } } } }
+                @if !told.is_empty() { ul { @for line in told.iter().take(LONGEST) { li { (with_code(line)) } } } }
             }
         }
     }
@@ -226,15 +229,41 @@ fn places(content: &Content<'_>) -> Vec<Bad> {
     all
 }
 
-fn listed(bad: &[Bad], input: &ReportInput) -> Markup {
+fn listed(bad: &[Bad], content: &Content<'_>) -> Markup {
+    let input = content.input;
     html! {
         @if bad.is_empty() {
             p { @if input.judged.is_empty() { "No wrinkle and no bridging was measured." } @else { "Nothing that was found is beyond its limit." } }
         } @else {
             ol class="places-bad" { @for b in bad.iter().take(SHOWN) {
-                li { b { (b.title()) } ": " (b.text.join(", ")) }
+                li data-defect=[defect_id(content, b)] { b { (b.title()) } ": " (b.text.join(", ")) }
             } }
+            p class="note" { "Places are those of the flat ply, as on the maps." }
             @if bad.len() > SHOWN { p class="note" { (plural(bad.len() - SHOWN, "more place is", "more places are")) " in the tables below." } }
+        }
+    }
+}
+
+/// The name on the page of the defect of a place, by which it is found on the maps and in the tables.
+fn defect_id(content: &Content<'_>, bad: &Bad) -> Option<String> {
+    let found = &bad.found[0].1;
+    let name = found.name.as_ref()?;
+    let is = |d: &ComparedDefect| {
+        d.id == *name && d.ply == found.ply && Some(&d.zone) == found.zone.as_ref()
+    };
+    let has = |s: &Study| {
+        let mut defects = s.comparison.iter().flat_map(|c| &c.told.defects);
+        defects.any(is)
+    };
+    let n = content.material.studies.iter().position(has)?;
+    Some(id_of(n, name))
+}
+
+/// A text whose words between grave accents are code.
+fn with_code(text: &str) -> Markup {
+    html! {
+        @for (i, part) in text.split('`').enumerate() {
+            @if i % 2 == 1 { code { (part) } } @else { (part) }
         }
     }
 }

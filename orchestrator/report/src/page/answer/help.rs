@@ -27,9 +27,9 @@ pub(super) fn leads(input: &ReportInput, bad: &[Bad]) -> Vec<Lead> {
     let cut = input.judged.iter().filter(|j| j.verdict == Kept::NotJudged);
     let mut cut = cut
         .flat_map(|j| &j.notes)
-        .filter(|n| n.contains("reaches the cut"));
+        .filter(|n| n.contains("the cut of"));
     all.extend(cut.next().map(|note| Lead {
-        advice: "Let the fine run of that zone reach farther.",
+        advice: "Let the fine runs reach farther there.",
         because: format!("{note}."),
     }));
     all
@@ -86,10 +86,10 @@ fn lead(cause: Cause, with: &[&Finding], found: &[&(LimitOn, Finding)]) -> Optio
         }
         Cause::Bridging => {
             let gap = |(on, f): &&&(LimitOn, Finding)| {
-                let is = matches!(on, LimitOn::BridgingGap | LimitOn::BridgingArea);
-                is.then_some(f.name.is_some()).is_some_and(|named| named)
+                matches!(on, LimitOn::BridgingGap | LimitOn::BridgingArea) && f.name.is_some()
             };
-            let gaps: Vec<&Finding> = found.iter().filter(gap).map(|(_, f)| f).collect();
+            let mut gaps: Vec<&Finding> = found.iter().filter(gap).map(|(_, f)| f).collect();
+            gaps.dedup_by_key(|f| f.name.clone());
             let beside = match with.is_empty() {
                 true => String::new(),
                 false => format!(
@@ -158,6 +158,7 @@ mod tests {
             at: [0.0; 2],
             value: 1e-3,
             by: "run".into(),
+            at_cut: false,
             cause: Some(cause),
             crest_shear: Some(shear),
         };
