@@ -1,5 +1,6 @@
 """Pictures of the HTML pages that Plyflow writes, taken with headless Chromium as tests/report does."""
 
+import functools
 import io
 import os
 import pathlib
@@ -65,6 +66,38 @@ def report():
         WebDriverWait(driver, PATIENCE).until(lambda d: d.find_element("css selector", ".view3d").get_attribute("data-ready"))
         driver.execute_script(TO_HEADING, "Formed plies in 3D")
     return photograph(page(spar.demo(), "report"), "report", 900, 880, prepare)
+
+
+# Of the first pictures of the guide, which shows the same text.
+LIMITS = """
+limits:
+  wrinkle_height: 3 mm
+  wrinkle_length: 40 mm
+  bridging_gap: 3 mm
+  shear_negative: -50 deg
+  places:
+    - {name: top, rectangle: {length: 300 mm, width: 100 mm}, wrinkle_height: 1 mm}
+    - {ply: ply_2, bridging_gap: 5 mm}
+"""
+
+
+@functools.cache
+def with_limits() -> pathlib.Path:
+    """The report of the coarse variant of the demo with limits, which are no part of a key: the run of the coarse variant serves."""
+    file = runs.workflows() / "joggle-spar" / "workflow-coarse.yaml"
+    limited = file.with_name("with-limits.yaml")
+    limited.write_text(file.read_text() + LIMITS)
+    return page(runs.run("joggle-spar/with-limits"), "report-limits")
+
+
+def report_answer():
+    """The first screen of a report with limits."""
+    return photograph(with_limits(), "report-answer", 1280, 800, lambda driver: None)
+
+
+def report_limits():
+    """The table of limits, with who has looked."""
+    return photograph(with_limits(), "report-limits", 1280, 520, lambda driver: driver.execute_script(TO_HEADING, "Limits"))
 
 
 def study():

@@ -58,7 +58,7 @@ pub enum Command {
     Explain(ExplainArgs),
     /// Print the named numbers of the last run, with the values that the workflow expects
     #[command(
-        after_help = "Examples:\n  plyflow results workflow.yaml\n  plyflow results workflow.yaml --format csv > results.csv\n  plyflow results workflow.yaml --front --format csv > front.csv   # speed against error, with the Pareto front\n  plyflow results workflow.yaml --check      # exit code 5 when an expectation is missed"
+        after_help = "Examples:\n  plyflow results workflow.yaml\n  plyflow results workflow.yaml --format csv > results.csv\n  plyflow results workflow.yaml --front --format csv > front.csv   # speed against error, with the Pareto front\n  plyflow results workflow.yaml --check      # exit code 5 when an expectation or a limit is missed"
     )]
     Results(ResultsArgs),
     /// Write the HTML report of what the store has
