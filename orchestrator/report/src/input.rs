@@ -1,7 +1,7 @@
 //! What a report is made of.
 
 use crate::family::Family;
-use crate::judge::Judged;
+use crate::judged::Judged;
 use camino::Utf8PathBuf;
 use plyflow_model::job::Record;
 use plyflow_model::workflow::Limits;
@@ -30,7 +30,7 @@ pub struct ReportInput {
     pub expectations: Vec<Expectation>,
     /// How large defects may be, if the workflow says so.
     pub limits: Option<Limits>,
-    /// How these limits fared ([`judge`](crate::judge)); empty without limits.
+    /// How these limits fared ([`judge`](crate::judge())); empty without limits.
     pub judged: Vec<Judged>,
     /// What failed: label of the instance and reason.
     pub failures: Vec<(String, String)>,

@@ -20,11 +20,12 @@ mod warned;
 use crate::draw::{DrawError, Drawn, Sharpness};
 use crate::family::Family;
 use crate::input::ReportInput;
-use crate::judge::{Kept, in_short};
+use crate::judged::Kept;
 use crate::page::content::Content;
 use crate::page::family::shown::Shown;
 use crate::page::verdict::Tone;
 use crate::read::{Study, places};
+use crate::told::in_short;
 use crate::units::bytes;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 

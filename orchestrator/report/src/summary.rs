@@ -2,10 +2,10 @@
 
 use crate::family::Family;
 use crate::input::{Expectation, Instance, ReportInput, Verdict, label};
-use crate::judge::{in_short, reasons, table as limit_table};
 use crate::page::expectations::{expected_text, got_text, is_notable};
 use crate::page::verdict;
 use crate::read::{Comparison, Material, Study};
+use crate::told::{in_short, reasons, table as limit_table};
 use crate::units::{bytes, duration, fixed, number, quantity};
 use camino::Utf8Path;
 use plyflow_model::text::one_line;

@@ -1,8 +1,9 @@
 //! Wrinkles and bridging: as a comparison of fine runs has them, else as a measurement has them; where neither has looked, by what the
 //! detection flags in the run of the whole part.
 
-use super::{Evidence, Finding};
+use super::evidence::Evidence;
 use crate::input::ReportInput;
+use crate::judged::Finding;
 use crate::read::{Material, Run, Study, judged_plies, open};
 use crate::units::{plural, quantity};
 use plyflow_model::artifact::{

@@ -1,8 +1,9 @@
 //! Shear and fibre strain: in every cell of the finest run that has it.
 
+use super::evidence::Evidence;
 use super::governed::Governed;
-use super::{Evidence, Finding, size};
 use crate::input::ReportInput;
+use crate::judged::{Finding, size};
 use crate::read::{Material, Run, Study, last_frame, open, quads};
 use crate::units::{plural, quantity};
 use plyflow_artifact::{Artifact, On};

@@ -1,6 +1,7 @@
 //! Where which limit holds.
 
-use super::{Evidence, Finding, Judged, Kept, size};
+use super::evidence::Evidence;
+use crate::judged::{Finding, Judged, Kept, size};
 use plyflow_model::artifact::Sheet;
 use plyflow_model::outline::Point;
 use plyflow_model::regions::holds;

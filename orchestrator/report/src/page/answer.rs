@@ -1,37 +1,23 @@
 //! The first screen: is the part good, where is it not, what would help, and can this be trusted.
 
+mod bad;
 mod help;
 
 use crate::input::ReportInput;
-use crate::judge::{Finding, Judged, Kept, allowed_text, found_text, in_short, largest, reasons};
+use crate::judged::{Judged, Kept};
 use crate::page::content::Content;
 use crate::page::verdict::{self, Tone};
 use crate::page::warned;
 use crate::plain::id_of;
 use crate::read::Study;
-use crate::units::{plural, quantity};
+use crate::told::{allowed_text, found_text, in_short, reasons};
+use crate::units::plural;
+use bad::{Bad, places};
 use maud::{Markup, html};
 use plyflow_model::artifact::ComparedDefect;
-use plyflow_model::workflow::LimitOn;
 
 /// Limits and places that the first screen tells; the rest is below.
 const SHOWN: usize = 6;
-
-/// A place where the part is not good, or has its largest defects.
-pub(super) struct Bad {
-    /// What was found there.
-    pub(super) found: Vec<(LimitOn, Finding)>,
-    /// By how much, in words.
-    text: Vec<String>,
-    /// The largest share of a limit.
-    ratio: f64,
-}
-
-impl Bad {
-    fn title(&self) -> String {
-        self.found[0].1.place()
-    }
-}
 
 /// The first screen of a page that is no study.
 pub(super) fn section(content: &Content<'_>) -> Markup {
@@ -175,58 +161,6 @@ pub(super) fn all_limits(input: &ReportInput) -> Markup {
             }
         }
     }
-}
-
-/// Places beyond limits, the worst first; without limits the largest defects.
-fn places(content: &Content<'_>) -> Vec<Bad> {
-    let input = content.input;
-    if input.judged.is_empty() {
-        let all = largest(input, &content.material).into_iter();
-        return all
-            .map(|(on, f)| Bad {
-                text: vec![format!(
-                    "{} {}",
-                    on.words(),
-                    quantity(f.value, on.unit(), 3)
-                )],
-                found: vec![(on, f)],
-                ratio: 0.0,
-            })
-            .collect();
-    }
-    let mut all: Vec<Bad> = Vec::new();
-    for j in input.judged.iter().filter(|j| j.verdict == Kept::Beyond) {
-        for f in &j.beyond {
-            let size = crate::judge::size(j.on, f.value);
-            let limit = crate::judge::size(j.on, j.limit);
-            let ratio = if limit > 0.0 {
-                size / limit
-            } else {
-                f64::INFINITY
-            };
-            let of = format!(
-                "{} {} ({})",
-                j.on.words(),
-                quantity(f.value, j.on.unit(), 3),
-                allowed_text(j)
-            );
-            let same = |b: &&mut Bad| b.found[0].1.name.is_some() && b.title() == f.place();
-            match all.iter_mut().find(same) {
-                Some(b) => {
-                    b.found.push((j.on, f.clone()));
-                    b.text.push(of);
-                    b.ratio = b.ratio.max(ratio);
-                }
-                None => all.push(Bad {
-                    found: vec![(j.on, f.clone())],
-                    text: vec![of],
-                    ratio,
-                }),
-            }
-        }
-    }
-    all.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
-    all
 }
 
 fn listed(bad: &[Bad], content: &Content<'_>) -> Markup {

@@ -1,8 +1,8 @@
 //! What would help: only what the fields of the run speak for, with what they say.
 
-use super::Bad;
+use super::bad::Bad;
 use crate::input::ReportInput;
-use crate::judge::{Finding, Kept};
+use crate::judged::{Finding, Kept};
 use crate::units::quantity;
 use plyflow_model::artifact::Cause;
 use plyflow_model::workflow::LimitOn;

@@ -1,6 +1,6 @@
 //! Verdicts on limits, in words.
 
-use super::{Finding, Judged, Kept};
+use crate::judged::{Finding, Judged, Kept, size};
 use crate::units::{plural, quantity};
 use plyflow_model::workflow::LimitOn;
 
@@ -25,8 +25,8 @@ impl Judged {
     /// How often the worst is as large as the limit; infinite beside a limit of nought.
     #[must_use]
     pub fn ratio(&self) -> Option<f64> {
-        let worst = super::size(self.on, self.worst.as_ref()?.value);
-        let limit = super::size(self.on, self.limit);
+        let worst = size(self.on, self.worst.as_ref()?.value);
+        let limit = size(self.on, self.limit);
         Some(if limit > 0.0 {
             worst / limit
         } else {
