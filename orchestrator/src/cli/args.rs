@@ -255,7 +255,7 @@ pub struct RunArgs {
     /// Do not write the HTML report
     #[arg(long)]
     pub no_report: bool,
-    /// End with code 5 when an expectation is missed
+    /// End with code 5 when an expectation or a limit is missed
     #[arg(long)]
     pub check: bool,
 }
@@ -385,7 +385,7 @@ pub struct ResultsArgs {
     /// Instead: what every way that a comparison measured costs, how wrong it is, and whether it is on the Pareto front
     #[arg(long, conflicts_with = "check")]
     pub front: bool,
-    /// End with code 5 when an expectation is missed
+    /// End with code 5 when an expectation or a limit is missed
     #[arg(long)]
     pub check: bool,
 }
