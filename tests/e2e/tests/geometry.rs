@@ -164,7 +164,7 @@ fn limits_are_judged_and_run_nothing_again(study: &Study) {
     assert_eq!(code(), Some(0));
     // The elements of the zone are membranes, and no fold of theirs is a wrinkle.
     with(
-        " {wrinkle_height: 1 m, places: [{ply: ply, rectangle: {length: 40 mm, width: 40 mm}, shear: 0 deg}]}\n",
+        " {wrinkle_height: 1 m, places: [{ply: ply_1, rectangle: {length: 40 mm, width: 40 mm}, shear: 0 deg}]}\n",
     );
     let ended = study.run(&["--check"]);
     assert_eq!((ended.code, ended.executed), (Some(5), 0));
@@ -187,7 +187,7 @@ fn limits_are_judged_and_run_nothing_again(study: &Study) {
     let (shear, place, by) = verdict("shear");
     assert_eq!(
         (shear.as_str(), place.as_str()),
-        (Some("beyond"), Some("a rectangle of ply"))
+        (Some("beyond"), Some("a rectangle of ply_1"))
     );
     assert_eq!(by, "1 fine run in its zone; coarse elsewhere");
     with(" {shear: 1 mm, places: [{ply: plie, shear: 1 deg}]}\n");
