@@ -164,7 +164,7 @@ fn limits_are_judged_and_run_nothing_again(study: &Study) {
     assert_eq!(code(), Some(0));
     // The elements of the zone are membranes, and no fold of theirs is a wrinkle.
     with(
-        " {wrinkle_height: 1 m, places: [{ply: ply_1, rectangle: {length: 40 mm, width: 40 mm}, shear: 0 deg}]}\n",
+        " {wrinkle_height: 1 m, places: [{ply: ply_1, rectangle: {length: 50 mm, width: 60 mm}, shear: 0 deg}]}\n",
     );
     let ended = study.run(&["--check"]);
     assert_eq!((ended.code, ended.executed), (Some(5), 0));
