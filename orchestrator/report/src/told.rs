@@ -38,11 +38,12 @@ impl Judged {
 /// The limit in words: `at most 1 mm`.
 #[must_use]
 pub fn allowed_text(j: &Judged) -> String {
-    let word = match j.on {
-        LimitOn::ShearNegative => "at least",
-        _ => "at most",
-    };
-    format!("{word} {}", quantity(j.limit, j.on.unit(), DIGITS))
+    let limit = quantity(j.limit, j.on.unit(), DIGITS);
+    match j.on {
+        LimitOn::ShearNegative => format!("at least {limit}"),
+        LimitOn::Shear | LimitOn::FibreStrain => format!("at most ±{limit}"),
+        _ => format!("at most {limit}"),
+    }
 }
 
 /// The worst that was found, in words: `2.1 mm`.
@@ -241,7 +242,9 @@ mod tests {
         let kept = [judged(LimitOn::ShearNegative, -0.9, &[-0.5], Kept::Within)];
         assert_eq!(in_short(&kept).unwrap().0, Kept::Within);
         assert_eq!(failing(&kept), None);
-        assert!(allowed_text(&kept[0]).starts_with("at least -51.6 deg"));
+        assert_eq!(allowed_text(&kept[0]), "at least -51.6 deg");
+        let both = judged(LimitOn::Shear, 0.9, &[], Kept::Within);
+        assert_eq!(allowed_text(&both), "at most ±51.6 deg");
         let open = [judged(LimitOn::Shear, 1.0, &[], Kept::NotJudged)];
         assert_eq!(in_short(&open).unwrap().0, Kept::NotJudged);
     }

@@ -47,6 +47,8 @@ pub(crate) struct Scene {
     pub(crate) tool: bool,
     /// What is shown coarser than it is, or not at all.
     pub(crate) notes: Vec<String>,
+    /// Whether the cells of all plies are those that were computed.
+    pub(crate) elements: bool,
     /// The fields of the menu.
     pub(crate) legends: Vec<Legend>,
     /// Fields that are the same everywhere, and those for which the page has no room.
@@ -172,6 +174,8 @@ pub(crate) fn scene(
         write(&mut stream, &extent, (body, found), &inside, &legends)
     };
     let told: Vec<ToldBody> = bodies.iter().zip(&thinned).map(write).collect();
+    let mut pairs = bodies.iter().zip(&told);
+    let elements = pairs.all(|(b, t)| b.ply.is_none() || t.points == b.formed.len());
     notes.extend(bodies.iter().zip(&told).filter_map(coarser));
     let outlines = outlines(&mut stream, &extent, shown.plies, shown.zones);
     let defects = defects(&mut stream, &extent, places);
@@ -193,6 +197,7 @@ pub(crate) fn scene(
         zones,
         tool,
         notes,
+        elements,
         legends,
         even: others.even,
         left_out,

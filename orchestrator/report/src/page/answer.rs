@@ -14,7 +14,7 @@ use crate::told::{allowed_text, found_text, in_short, reasons};
 use crate::units::plural;
 use bad::{Bad, places};
 use maud::{Markup, html};
-use plyflow_model::artifact::ComparedDefect;
+use plyflow_model::artifact::{Attributes, ComparedDefect, Measurement};
 
 /// Limits and places that the first screen tells; the rest is below.
 const SHOWN: usize = 6;
@@ -167,7 +167,9 @@ fn listed(bad: &[Bad], content: &Content<'_>) -> Markup {
     let input = content.input;
     html! {
         @if bad.is_empty() {
-            p { @if input.judged.is_empty() { "No wrinkle and no bridging was measured." } @else { "Nothing that was found is beyond its limit." } }
+            @if !input.judged.is_empty() { p { "Nothing that was found is beyond its limit." } }
+            @else if measured(content) { p { "No wrinkle and no bridging was measured." } }
+            @else if verdict::found(&content.material).is_empty() { p { "No step has measured defects." } }
         } @else {
             ol class="places-bad" { @for b in bad.iter().take(SHOWN) {
                 li data-defect=[defect_id(content, b)] { b { (b.title()) } ": " (b.text.join(", ")) }
@@ -176,6 +178,12 @@ fn listed(bad: &[Bad], content: &Content<'_>) -> Markup {
             @if bad.len() > SHOWN { p class="note" { (plural(bad.len() - SHOWN, "more place is", "more places are")) " in the tables below." } }
         }
     }
+}
+
+/// Whether a step has measured the defects of a whole run.
+fn measured(content: &Content<'_>) -> bool {
+    let facts = content.material.facts.iter().flatten();
+    facts.into_iter().any(|f| f.kind == Measurement::KIND)
 }
 
 /// The name on the page of the defect of a place, by which it is found on the maps and in the tables.

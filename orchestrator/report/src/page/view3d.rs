@@ -111,7 +111,7 @@ fn controls(scene: &Scene, n: usize) -> Markup {
             span class="group" role="group" aria-label="Lines" {
                 (on_request("edges", "Ply edges"))
                 // Of a mesh that is shown coarser than it is, the lines would be no elements.
-                @if scene.notes.is_empty() { (on_request("mesh", "Mesh")) }
+                @if scene.elements { (on_request("mesh", "Mesh")) }
             }
             @if !scene.zones.is_empty() {
                 span class="group" role="group" aria-label="Finer plies of zones" {
