@@ -19,13 +19,13 @@ import style
 PATIENCE = 60
 
 
-def chromium(width: int, height: int):
-    """Chromium with WebGL in software, without a way out."""
+def chromium(width: int, height: int, scale: float):
+    """Chromium with WebGL in software, without a way out. `scale`: pixels of the picture for one of the page."""
     options = webdriver.ChromeOptions()
     options.binary_location = shutil.which("chromium") or ""
     arguments = ["--headless=new", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", f"--window-size={width},{height}",
                  "--host-resolver-rules=MAP * ~NOTFOUND", "--disable-background-networking", "--no-first-run", "--disable-dev-shm-usage",
-                 "--hide-scrollbars", "--force-device-scale-factor=1.5"]
+                 "--hide-scrollbars", f"--force-device-scale-factor={scale}"]
     if os.geteuid() == 0:
         arguments.append("--no-sandbox")
     for argument in arguments:
@@ -33,9 +33,9 @@ def chromium(width: int, height: int):
     return webdriver.Chrome(options=options, service=webdriver.ChromeService(executable_path=shutil.which("chromedriver")))
 
 
-def photograph(page: pathlib.Path, name: str, width: int, height: int, prepare):
+def photograph(page: pathlib.Path, name: str, width: int, height: int, prepare, scale: float = 1.5):
     """A picture of a page, after `prepare` has been called with the driver and has brought the right place into view."""
-    driver = chromium(width, height)
+    driver = chromium(width, height, scale)
     try:
         driver.get(page.resolve().as_uri())
         prepare(driver)
@@ -92,12 +92,12 @@ def with_limits() -> pathlib.Path:
 
 def report_answer():
     """The first screen of a report with limits."""
-    return photograph(with_limits(), "report-answer", 1280, 800, lambda driver: None)
+    return photograph(with_limits(), "report-answer", 1280, 880, lambda driver: None, scale=1)
 
 
 def report_limits():
     """The table of limits, with who has looked."""
-    return photograph(with_limits(), "report-limits", 1280, 520, lambda driver: driver.execute_script(TO_HEADING, "Limits"))
+    return photograph(with_limits(), "report-limits", 1280, 660, lambda driver: driver.execute_script(TO_HEADING, "Limits"), scale=1)
 
 
 def study():

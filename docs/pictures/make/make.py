@@ -23,7 +23,7 @@ PICTURES = {
 }
 # Largest files, in bytes.
 LARGEST = {".png": 250_000, ".svg": 150_000}
-LARGEST_TOGETHER = 2_500_000
+LARGEST_TOGETHER = 2_600_000
 
 
 def main(names: list[str]) -> int:
