@@ -23,7 +23,7 @@ const SHOWN: usize = 6;
 pub(super) fn section(content: &Content<'_>) -> Markup {
     let (input, material) = (content.input, &content.material);
     let bad = places(content);
-    let (trust, told) = verdict::trust(material, input);
+    let (trust, told) = verdict::trust(material);
     let (tone, headline) = headline(input, trust);
     let help = help::leads(input, &bad);
     let warnings = warned::counts(input, material);

@@ -80,7 +80,7 @@ pub(crate) fn found(material: &Material) -> Vec<String> {
 }
 
 /// Whether the answer can be trusted, for the first screen: sentences, and the worst of what they say.
-pub(crate) fn trust(material: &Material, input: &ReportInput) -> (Tone, Vec<String>) {
+pub(crate) fn trust(material: &Material) -> (Tone, Vec<String>) {
     let rank = |tone: &Tone| match tone {
         Tone::Good => 0,
         Tone::Found => 1,
@@ -98,8 +98,7 @@ pub(crate) fn trust(material: &Material, input: &ReportInput) -> (Tone, Vec<Stri
     let unsure =
         |s: &Study| s.comparison.is_some() && s.confirmed.is_none() && s.reference.is_none();
     if material.studies.iter().any(unsure) {
-        let command = input.command("run");
-        told.push(format!("Not known: whether the defects stay in finer and wider zones. `{command} --confirm` tells."));
+        told.push("Not known: whether the defects stay in finer and wider zones. `plyflow run --confirm` tells.".into());
     }
     (worst, told)
 }
