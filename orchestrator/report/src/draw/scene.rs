@@ -174,14 +174,13 @@ pub(crate) fn scene(
         write(&mut stream, &extent, (body, found), &inside, &legends)
     };
     let told: Vec<ToldBody> = bodies.iter().zip(&thinned).map(write).collect();
-    let mut pairs = bodies.iter().zip(&told);
-    let elements = pairs.all(|(b, t)| b.ply.is_none() || t.points == b.formed.len());
     notes.extend(bodies.iter().zip(&told).filter_map(coarser));
     let outlines = outlines(&mut stream, &extent, shown.plies, shown.zones);
     let defects = defects(&mut stream, &extent, places);
     let plies = distinct(told.iter().filter_map(|b| b.ply.clone()));
     let zones = distinct(told.iter().filter_map(|b| b.zone.clone()));
     let tool = told.iter().any(|b| b.ply.is_none());
+    let elements = are_elements(&bodies, &told);
     let told = Told {
         extent,
         lift: shown.plies.iter().map(lift).fold(0.0, f64::max),
@@ -203,6 +202,12 @@ pub(crate) fn scene(
         left_out,
         defects: !places.is_empty(),
     }))
+}
+
+/// Whether the cells of all plies are those that were computed.
+fn are_elements(bodies: &[Body<'_>], told: &[ToldBody]) -> bool {
+    let mut pairs = bodies.iter().zip(told);
+    pairs.all(|(b, t)| b.ply.is_none() || t.points == b.formed.len())
 }
 
 /// Says how much of a mesh is shown, if that is not all of it.

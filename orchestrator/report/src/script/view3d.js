@@ -131,7 +131,8 @@
           if (!body.ply) continue;
           const over = { position: body.position, colour: [0, 0, 0, 0.45], lift: lift + 0.0006 };
           if (show.mesh) for (const part of parts) this.paint.wire({ ...over, elements: part.mesh() });
-          if (show.edges) this.paint.line({ ...body.rim(), width: 1.8, colour: [0, 0, 0, 1], hide: true, lift: lift + 0.001 });
+          // The finer ply of a zone ends at the zone's cut, which is no edge of the ply.
+          if (show.edges && !body.zone) this.paint.line({ ...body.rim(), width: 1.8, colour: [0, 0, 0, 1], hide: true, lift: lift + 0.001 });
         }
         for (const outline of this.outlines()) this.stroke(outline.ribbon, 1.2, [0, 0, 0], 0.15);
         if (this.chosen()) this.stroke(this.chosen().ribbon, 3, PICK, 0.6);
