@@ -136,7 +136,7 @@ fn the_first_screen_answers_and_leads_to_the_defects() {
         "<td class=\"missed\">✗ beyond</td>",
         "<td class=\"met\">✓ within</td>",
         "<li data-defect=\"0-AW1\"><b>AW1 on ply_2, zone A at x = ",
-        "AW1 lies beside a bridge",
+        "AW1, BW1 lie beside bridges",
         "2 zones; 2 wrinkles, longest 68.4 mm; 2 bridging areas.",
         "Nothing speaks against it.",
         "--confirm</code> tells.",
