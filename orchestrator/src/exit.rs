@@ -10,7 +10,7 @@ pub const USAGE: u8 = 2;
 pub const INVALID: u8 = 3;
 /// At least one step failed; the rest ran as the failure policy says.
 pub const STEP_FAILED: u8 = 4;
-/// A stated expectation was missed or could not be judged (only with `--check`).
+/// A stated expectation or a limit was missed or could not be judged (only with `--check`).
 pub const EXPECTATION: u8 = 5;
 /// Another process runs this workflow.
 pub const LOCKED: u8 = 6;
@@ -31,7 +31,7 @@ Exit codes:
     2  wrong command line
     3  the workflow has errors; nothing was run
     4  a step failed
-    5  an expectation was missed (with --check)
+    5  an expectation or a limit was missed (with --check)
     6  another process is running this workflow
     7  a plugin does not keep the contract (check-plugin)
     8  something in the store is damaged; the same run makes it again

@@ -4,8 +4,8 @@
 usage: check_report.py [--screenshots FOLDER] REPORT.html...
 
 Fails on any error in the console, any request but the page itself, a file of 5 MB or more; with formed plies also
-unless the 3D view draws in several colours and changes when it is dragged, turned by keys, asked for another field or without
-its bodies, and a defect is highlighted in the table, on the maps and in the view; of a study unless its table sorts, its marks lead to
+unless the 3D view draws in several colours and changes when it is dragged, turned by keys, asked for another field, for lines or without
+its bodies, the first screen has its answers above the fold at 1280 x 800, and a defect is highlighted in the table, on the maps and in the view; of a study unless its table sorts, its marks lead to
 their points and it fits a phone. Needs chromium, chromium-driver
 and the package selenium. Exit code 0: all as it should be.
 """
@@ -155,12 +155,36 @@ def check_view(page, section):
     # Two flags may be one pattern, as where nothing is sheared too far; of more the choice does nothing.
     assert len(alike) <= 1, f"choosing {alike} changes nothing in the 3D view"
     options[0].click()
+    plain = page.look(canvas)["mark"]
+    for box in section.find_elements(By.CSS_SELECTOR, "input[data-show='mesh'], input[data-show='edges']"):
+        what = box.get_attribute("data-show")
+        page.changes([canvas], f"asking for {what}", box.click)
+        box.click()
+        assert page.look(canvas)["mark"] == plain, f"something of {what} is left when it is off again"
     for box in section.find_elements(By.CSS_SELECTOR, "input[data-show='tool'], input[data-show='ply']"):
         box.click()
     assert page.look(canvas)["covered"] == 0, "something is left when all bodies are off"
     for box in section.find_elements(By.CSS_SELECTOR, "input[data-show='tool'], input[data-show='ply']"):
         box.click()
     return f"{shown['colours']} colours, {len(options)} fields"
+
+
+def check_answer(page):
+    """The first screen has its four answers above the fold, and its places lead to the maps."""
+    try:
+        size = {"width": 1280, "height": 800, "deviceScaleFactor": 1, "mobile": False}
+        page.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        for answer in page.all("#answer .answers > div"):
+            bottom = page.driver.execute_script("return arguments[0].getBoundingClientRect().bottom + scrollY", answer)
+            assert bottom <= 800, f"{answer.get_attribute('id')} ends at {bottom:.0f} of 800"
+        assert len(page.all("#answer .answers > div h2")) == 4, "there are not four answers"
+    finally:
+        page.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    for place in page.all("#answer li.selectable")[:1]:
+        page.press(place)
+        assert page.all("tr.lit"), "a place of the first screen is not highlighted in the table"
+        place.click()
+    return "four answers"
 
 
 def check_defects(page):
@@ -259,6 +283,8 @@ def check(path, folder):
         page = Page(driver, path)
         for section in page.all("section[id^='view-']"):
             said.append(check_view(page, section))
+        if page.all("#answer"):
+            said.append(check_answer(page))
         if page.all(".view3d"):
             said.append(check_defects(page))
         if page.all("table.points"):

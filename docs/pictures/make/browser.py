@@ -1,5 +1,6 @@
 """Pictures of the HTML pages that Plyflow writes, taken with headless Chromium as tests/report does."""
 
+import functools
 import io
 import os
 import pathlib
@@ -18,13 +19,13 @@ import style
 PATIENCE = 60
 
 
-def chromium(width: int, height: int):
-    """Chromium with WebGL in software, without a way out."""
+def chromium(width: int, height: int, scale: float):
+    """Chromium with WebGL in software, without a way out. `scale`: pixels of the picture for one of the page."""
     options = webdriver.ChromeOptions()
     options.binary_location = shutil.which("chromium") or ""
     arguments = ["--headless=new", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", f"--window-size={width},{height}",
                  "--host-resolver-rules=MAP * ~NOTFOUND", "--disable-background-networking", "--no-first-run", "--disable-dev-shm-usage",
-                 "--hide-scrollbars", "--force-device-scale-factor=1.5"]
+                 "--hide-scrollbars", f"--force-device-scale-factor={scale}"]
     if os.geteuid() == 0:
         arguments.append("--no-sandbox")
     for argument in arguments:
@@ -32,9 +33,9 @@ def chromium(width: int, height: int):
     return webdriver.Chrome(options=options, service=webdriver.ChromeService(executable_path=shutil.which("chromedriver")))
 
 
-def photograph(page: pathlib.Path, name: str, width: int, height: int, prepare):
+def photograph(page: pathlib.Path, name: str, width: int, height: int, prepare, scale: float = 1.5):
     """A picture of a page, after `prepare` has been called with the driver and has brought the right place into view."""
-    driver = chromium(width, height)
+    driver = chromium(width, height, scale)
     try:
         driver.get(page.resolve().as_uri())
         prepare(driver)
@@ -65,6 +66,38 @@ def report():
         WebDriverWait(driver, PATIENCE).until(lambda d: d.find_element("css selector", ".view3d").get_attribute("data-ready"))
         driver.execute_script(TO_HEADING, "Formed plies in 3D")
     return photograph(page(spar.demo(), "report"), "report", 900, 880, prepare)
+
+
+# Of the first pictures of the guide, which shows the same text.
+LIMITS = """
+limits:
+  wrinkle_height: 3 mm
+  wrinkle_length: 40 mm
+  bridging_gap: 3 mm
+  shear_negative: -50 deg
+  places:
+    - {name: top, rectangle: {length: 300 mm, width: 100 mm}, wrinkle_height: 1 mm}
+    - {ply: ply_2, bridging_gap: 5 mm}
+"""
+
+
+@functools.cache
+def with_limits() -> pathlib.Path:
+    """The report of the coarse variant of the demo with limits, which are no part of a key: the run of the coarse variant serves."""
+    file = runs.workflows() / "joggle-spar" / "workflow-coarse.yaml"
+    limited = file.with_name("with-limits.yaml")
+    limited.write_text(file.read_text() + LIMITS)
+    return page(runs.run("joggle-spar/with-limits"), "report-limits")
+
+
+def report_answer():
+    """The first screen of a report with limits."""
+    return photograph(with_limits(), "report-answer", 1280, 880, lambda driver: None, scale=1)
+
+
+def report_limits():
+    """The table of limits, with who has looked."""
+    return photograph(with_limits(), "report-limits", 1280, 660, lambda driver: driver.execute_script(TO_HEADING, "Limits"), scale=1)
 
 
 def study():

@@ -10,10 +10,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     std::fs::create_dir_all(&folder)?;
     let mut study = common::whole_study(&folder);
     study.measurement();
+    let mut limited = common::whole(&folder);
+    limited.limits = Some(serde_json::from_value(serde_json::json!({
+        "wrinkle_length": "60 mm", "wrinkle_height": "2 mm", "bridging_gap": "3 mm", "shear_positive": "20 deg", "shear_negative": "-50 deg",
+    }))?);
+    limited.judged = plyflow_report::judge(&limited);
     let mut coupons = common::Study::new(&folder);
     coupons.coupon();
     for (input, name) in [
         (study.input(), "report.html"),
+        (limited, "limits.html"),
         (coupons.input(), "coupon.html"),
         (common::family::friction_map(&folder), "study-map.html"),
         (common::family::sweep(&folder, 5), "study-sweep.html"),

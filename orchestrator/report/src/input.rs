@@ -1,8 +1,10 @@
 //! What a report is made of.
 
 use crate::family::Family;
+use crate::judged::Judged;
 use camino::Utf8PathBuf;
 use plyflow_model::job::Record;
+use plyflow_model::workflow::Limits;
 
 /// A run as the engine knows it. Arrays are read from the artifacts when the report is written.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,6 +28,10 @@ pub struct ReportInput {
     pub instances: Vec<Instance>,
     /// What is expected of results, each with what was found.
     pub expectations: Vec<Expectation>,
+    /// How large defects may be, if the workflow says so.
+    pub limits: Option<Limits>,
+    /// How these limits fared ([`judge`](crate::judge())); empty without limits.
+    pub judged: Vec<Judged>,
     /// What failed: label of the instance and reason.
     pub failures: Vec<(String, String)>,
     /// Number of instances that are known and did not run.

@@ -9,18 +9,24 @@
 mod draw;
 mod family;
 mod input;
+mod judge;
+mod judged;
 mod page;
 mod plain;
 mod read;
 mod summary;
+mod told;
 mod units;
 
 pub use draw::DrawError;
 pub use family::{Family, Fate, Origin, Point, Response, Sampled, Value, Variable};
 pub use input::{Expectation, Instance, ReportInput, Verdict};
+pub use judge::judge;
+pub use judged::{Finding, Judged, Kept};
 pub use read::{COUNTS, Measure, OfClass, TARGETS, Way, Ways, advice, ways};
 pub use summary::summary;
-pub use units::bytes;
+pub use told::{allowed_text, failing, found_text, in_short, reasons, table as limit_table};
+pub use units::{bytes, in_users_units};
 
 use camino::{Utf8Path, Utf8PathBuf};
 use draw::Sharpness;

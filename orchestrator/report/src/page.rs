@@ -1,5 +1,6 @@
 //! The page.
 
+mod answer;
 mod carried;
 mod carried_tables;
 pub(crate) mod content;
@@ -14,14 +15,17 @@ mod steps;
 mod tables;
 pub(crate) mod verdict;
 mod view3d;
+mod warned;
 
 use crate::draw::{DrawError, Drawn, Sharpness};
 use crate::family::Family;
 use crate::input::ReportInput;
+use crate::judged::Kept;
 use crate::page::content::Content;
 use crate::page::family::shown::Shown;
 use crate::page::verdict::Tone;
 use crate::read::{Study, places};
+use crate::told::in_short;
 use crate::units::bytes;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -63,6 +67,7 @@ pub(crate) fn page(
                 @if sharp.is_coarse() { (coarser(in_full)) }
                 main {
                     @if let Some(points) = &points { (points) }
+                    (answer::all_limits(input))
                     @for study in &studies { (study) }
                     (steps)
                     (fidelity::section(rest))
@@ -101,29 +106,25 @@ fn header(content: &Content<'_>, study: Option<&Shown<'_>>, large: bool) -> Mark
     let (input, material) = (content.input, &content.material);
     // What is of single points stands in their places: before the table it would bury what all of them say.
     let apart = study.is_some();
-    let warnings = verdict::warnings(input, material, apart);
     html! {
         header {
             p class="kind" { @if study.is_some() { "Study" } @else { "Forming report" } }
             h1 { (input.workflow) }
-            @if let Some(text) = &input.description { p class="description" { (text) } }
             @if let Some(s) = study {
                 @let whole = s.family.count("done") == s.family.points.len();
                 p class={ "verdict " (class(if whole { Tone::Good } else { Tone::Bad })) } { (s.family.counts()) }
             }
-            @for study in material.studies.iter().filter(|_| !apart) {
-                @let (tone, text) = verdict::of_study(study);
-                @if !text.is_empty() {
-                    p class={ "verdict " (class(tone)) } {
-                        @if !study.title.is_empty() { span class="of" { (study.title) } " " }
-                        (text)
-                    }
-                }
-            }
+            @let answered = !apart && (!material.studies.is_empty() || input.limits.is_some());
+            @if answered { (answer::section(content)) }
+            @if let Some(text) = &input.description { p class="description" { (text) } }
             @let (tone, text) = verdict::of_run(input);
-            @if !text.is_empty() { p class={ "verdict " (class(tone)) } { (text) } }
-            @if material.studies.is_empty() && text.is_empty() && study.is_none() {
+            @if !text.is_empty() { p class={ "verdict run " (class(tone)) } { (text) } }
+            @if !answered && text.is_empty() && !apart {
                 p class="verdict good" { (input.instances.len()) " steps finished" }
+            }
+            @if let Some((kept, text)) = in_short(&input.judged).filter(|_| apart) {
+                @let tone = match kept { Kept::Within => Tone::Good, Kept::Beyond => Tone::Bad, Kept::NotJudged => Tone::Found };
+                p class={ "verdict " (class(tone)) } { "Over all points, the part " (text) "." }
             }
             @if !input.failures.is_empty() && study.is_none() {
                 section class="warnings bad" id="failures" {
@@ -131,47 +132,10 @@ fn header(content: &Content<'_>, study: Option<&Shown<'_>>, large: bool) -> Mark
                     dl { @for (label, reason) in &input.failures { dt { (label) } dd { (reason) } } }
                 }
             }
-            @if !warnings.is_empty() {
-                section class="warnings" id="warnings" {
-                    h2 { "Warnings" }
-                    dl { @for kind in verdict::alike(&warnings) { (warned(&kind)) } }
-                }
-            }
-            @if let Some(s) = study { (family::warned(s)) }
             (contents(content, large))
+            (warned::section(input, material, apart))
+            @if let Some(s) = study { (family::warned(s)) }
         }
-    }
-}
-
-/// Steps that a kind of warning names before the rest are counted.
-const NAMED: usize = 4;
-
-/// A kind of warning: who says it, in the words of the first, and those of the others on request.
-fn warned(kind: &verdict::Alike<'_>) -> Markup {
-    let steps = kind.steps();
-    let mut names = steps[..steps.len().min(NAMED)].join(", ");
-    if steps.len() > NAMED {
-        names += &format!(" and {} more", steps.len() - NAMED);
-    }
-    html! {
-        dt { (names) }
-        dd {
-            (kind.said[0].1)
-            @if kind.said.len() > 1 {
-                details {
-                    summary { "the same " (times(kind.said.len() - 1)) " more" }
-                    ul { @for (step, text) in &kind.said[1..] { li { b { (step) } ": " (text) } } }
-                }
-            }
-        }
-    }
-}
-
-/// How often, in words.
-fn times(n: usize) -> String {
-    match n {
-        1 => "once".into(),
-        n => format!("{n} times"),
     }
 }
 
@@ -207,6 +171,7 @@ fn contents(content: &Content<'_>, large: bool) -> Markup {
         (failed, "#failed", "Failed points"),
         (responses, "#responses", "Responses"),
         (family.is_some(), "#places", "Point by point"),
+        (!input.judged.is_empty(), "#limits", "Limits"),
         (maps, "#view-0", "3D view"),
         (maps, "#maps-0", "Maps"),
         (local, "#local-0", "Local runs"),

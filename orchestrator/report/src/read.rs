@@ -21,11 +21,11 @@ pub(crate) mod tables;
 
 pub(crate) use carried::{CARRIED, files};
 pub(crate) use comparison::Comparison;
-pub(crate) use facts::{Facts, open};
+pub(crate) use facts::{Facts, last_frame, open, quads};
 pub use fidelity::{COUNTS, Measure, OfClass, TARGETS, Way, Ways, advice, ways};
 pub(crate) use material::Material;
 pub(crate) use places::places;
-pub(crate) use plies::shown_sheet;
+pub(crate) use plies::{judged_plies, shown_sheet};
 pub(crate) use sheet::Source;
 pub(crate) use study::{Local, Run, Study};
 pub(crate) use tables::ROWS;

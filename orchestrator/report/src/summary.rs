@@ -5,6 +5,7 @@ use crate::input::{Expectation, Instance, ReportInput, Verdict, label};
 use crate::page::expectations::{expected_text, got_text, is_notable};
 use crate::page::verdict;
 use crate::read::{Comparison, Material, Study};
+use crate::told::{in_short, reasons, table as limit_table};
 use crate::units::{bytes, duration, fixed, number, quantity};
 use camino::Utf8Path;
 use plyflow_model::text::one_line;
@@ -21,7 +22,7 @@ const ITEMS: usize = 3;
 #[must_use]
 pub fn summary(input: &ReportInput, report: Option<&Utf8Path>) -> String {
     let material = Material::read(input, false);
-    let mut blocks: Vec<String> = Vec::new();
+    let mut blocks: Vec<String> = limit_block(input).into_iter().collect();
     let large = input.family.as_ref().is_some_and(Family::is_large);
     // The table of a study tells of its points; one line for each run of each would bury it.
     for study in material.studies.iter().filter(|_| !large) {
@@ -43,6 +44,22 @@ pub fn summary(input: &ReportInput, report: Option<&Utf8Path>) -> String {
     blocks.extend(report.map(|path| format!("report: {path}\n")));
     blocks.retain(|b| !b.is_empty());
     blocks.join("\n")
+}
+
+/// Whether the part is good: the verdict, each limit with what was found, and why something is not judged.
+fn limit_block(input: &ReportInput) -> Option<String> {
+    let (_, text) = in_short(&input.judged)?;
+    let (head, rows) = limit_table(&input.judged);
+    let more = rows.len().saturating_sub(LONGEST);
+    let mut out = format!("the part {text}\n");
+    out += &table(&head, &rows[..rows.len() - more], &[]);
+    if more > 0 {
+        out += &format!("{more} more limits are in the report\n");
+    }
+    for line in reasons(&input.judged) {
+        out += &(line + "\n");
+    }
+    Some(out)
 }
 
 fn warning_lines(warnings: &[(String, String)]) -> String {

@@ -14,6 +14,13 @@ pub(crate) fn shown(unit: &str) -> (f64, &str) {
     }
 }
 
+/// A value (SI) as people read it, and the unit in which it is told; that is empty where there is none.
+#[must_use]
+pub fn in_users_units(value: f64, unit: &str, digits: i32) -> (String, String) {
+    let (factor, name) = shown(unit);
+    (number(value * factor, digits), name.to_owned())
+}
+
 /// A number as people read it: `digits` significant digits, no trailing zeros.
 pub(crate) fn number(value: f64, digits: i32) -> String {
     if value == 0.0 || !value.is_finite() {

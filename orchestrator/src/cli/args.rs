@@ -58,7 +58,7 @@ pub enum Command {
     Explain(ExplainArgs),
     /// Print the named numbers of the last run, with the values that the workflow expects
     #[command(
-        after_help = "Examples:\n  plyflow results workflow.yaml\n  plyflow results workflow.yaml --format csv > results.csv\n  plyflow results workflow.yaml --front --format csv > front.csv   # speed against error, with the Pareto front\n  plyflow results workflow.yaml --check      # exit code 5 when an expectation is missed"
+        after_help = "Examples:\n  plyflow results workflow.yaml\n  plyflow results workflow.yaml --format csv > results.csv\n  plyflow results workflow.yaml --front --format csv > front.csv   # speed against error, with the Pareto front\n  plyflow results workflow.yaml --check      # exit code 5 when an expectation or a limit is missed"
     )]
     Results(ResultsArgs),
     /// Write the HTML report of what the store has
@@ -255,7 +255,7 @@ pub struct RunArgs {
     /// Do not write the HTML report
     #[arg(long)]
     pub no_report: bool,
-    /// End with code 5 when an expectation is missed
+    /// End with code 5 when an expectation or a limit is missed
     #[arg(long)]
     pub check: bool,
 }
@@ -385,7 +385,7 @@ pub struct ResultsArgs {
     /// Instead: what every way that a comparison measured costs, how wrong it is, and whether it is on the Pareto front
     #[arg(long, conflicts_with = "check")]
     pub front: bool,
-    /// End with code 5 when an expectation is missed
+    /// End with code 5 when an expectation or a limit is missed
     #[arg(long)]
     pub check: bool,
 }

@@ -13,7 +13,7 @@ use crate::exit;
 use crate::said::{Done, Stop, print};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::job::Record;
-use plyflow_report::{Expectation, Instance, ReportInput, is_current, write_report};
+use plyflow_report::{Expectation, Instance, Kept, ReportInput, is_current, judge, write_report};
 
 /// `plyflow report`.
 ///
@@ -72,7 +72,7 @@ pub fn beside(workflow: &Utf8Path, until: &[String]) -> Utf8PathBuf {
 }
 
 /// Changes with what a page shows of the same artifacts: an older page is then written again.
-const LAYOUT: &[u8] = b"page 9";
+const LAYOUT: &[u8] = b"page 10";
 
 /// Names all that a report depends on. `page`: where it lies.
 pub fn fingerprint(
@@ -96,6 +96,7 @@ pub fn fingerprint(
         .unwrap_or_default()
         .as_bytes());
     add(&serde_json::to_vec(&opened.workflow.expectations).unwrap_or_default());
+    add(&serde_json::to_vec(&opened.workflow.limits).unwrap_or_default());
     for instance in session.core.instances() {
         add(&instance.key.map(|k| k.0).unwrap_or_default());
         add(&[u8::from(matches!(instance.state, State::Done { .. }))]);
@@ -163,7 +164,7 @@ pub fn input(
     };
     let file = &opened.workflow.file;
     let family = super::study_report::family(session, &found.records, file, page);
-    ReportInput {
+    let mut input = ReportInput {
         workflow: opened.workflow.name.clone(),
         description: opened.workflow.description.clone(),
         file: given.workflow.clone(),
@@ -179,7 +180,15 @@ pub fn input(
             .collect(),
         not_run: (0..core.instances().len()).filter(did_not_run).count(),
         family: family.filter(|_| until.is_empty()),
+        limits: opened.workflow.limits.clone(),
+        judged: Vec::new(),
+    };
+    input.judged = judge(&input);
+    // What `--until` leaves out is not judged either, as it is not expected.
+    if !until.is_empty() {
+        input.judged.retain(|j| j.verdict != Kept::NotJudged);
     }
+    input
 }
 
 #[cfg(test)]

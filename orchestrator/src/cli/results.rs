@@ -7,18 +7,26 @@ use super::found::row::{Row, Verdict};
 use super::found::rows::{Found, records, rows};
 use super::open::{Opened, open};
 use super::report::{beside, input};
-use super::table::{bytes, csv_text, number, table};
+use super::table::{bytes, csv_text, table};
 use crate::engine::core::Id;
 use crate::engine::{Depth, Session};
 use crate::exit;
 use crate::progress::duration_text;
 use crate::said::{Done, Stop, print};
 use plyflow_model::job::Record;
+use plyflow_model::workflow::LimitOn;
+use plyflow_report::{
+    Finding, Judged, ReportInput, failing, in_short, in_users_units, limit_table, reasons,
+};
 use plyflow_workflow::resolved::Expectation;
 use serde_json::json;
 
-/// What the expectation says, in words.
-fn expectation_text(e: &Expectation) -> String {
+/// Digits of numbers in tables.
+const DIGITS: i32 = 6;
+
+/// What the expectation says, in words: its numbers in the unit in which the result is told.
+fn expectation_text(e: &Expectation, unit: &str) -> String {
+    let number = |v: f64| in_users_units(v, unit, DIGITS).0;
     let mut parts = Vec::new();
     if let Some(v) = e.value {
         match e.tolerance {
@@ -35,7 +43,7 @@ fn expectation_text(e: &Expectation) -> String {
     parts.join(", ")
 }
 
-/// A table of numbers.
+/// A table of numbers, in the units in which forming is talked about, as at the end of a run.
 pub fn results_table(rows: &[Row]) -> String {
     let line = |r: &Row| {
         let place = if r.item.is_empty() {
@@ -48,18 +56,16 @@ pub fn results_table(rows: &[Row]) -> String {
         } else {
             r.name.clone()
         };
+        let shown = r.value.map(|v| in_users_units(v, &r.unit, DIGITS));
+        let (_, unit) = in_users_units(0.0, &r.unit, DIGITS);
         vec![
             place,
             name,
-            r.value.map_or("(absent)".into(), number),
-            if r.unit == "1" {
-                String::new()
-            } else {
-                r.unit.clone()
-            },
+            shown.map_or("(absent)".into(), |(number, _)| number),
+            unit,
             r.expected
                 .as_ref()
-                .map(expectation_text)
+                .map(|e| expectation_text(e, &r.unit))
                 .unwrap_or_default(),
             r.verdict().map_or("", Verdict::word).to_owned(),
         ]
@@ -70,6 +76,19 @@ pub fn results_table(rows: &[Row]) -> String {
         &lines,
         &[2],
     )
+}
+
+/// How the limits fared, and why some are not judged; empty without limits.
+fn limits_text(judged: &[Judged]) -> String {
+    let Some((_, text)) = in_short(judged) else {
+        return String::new();
+    };
+    let (head, lines) = limit_table(judged);
+    let mut out = format!("the part {text}\n{}", table(&head, &lines, &[]));
+    for line in reasons(judged) {
+        out += &(line + "\n");
+    }
+    out + "\n"
 }
 
 /// A table of what the steps cost.
@@ -92,7 +111,25 @@ pub fn cost_table(session: &Session<'_>, records: &[(Id, Record)]) -> String {
     )
 }
 
-fn as_json(session: &Session<'_>, rows: &[Row], records: &[(Id, Record)]) -> serde_json::Value {
+/// A finding as JSON, in SI.
+fn finding_json(f: &Finding) -> serde_json::Value {
+    json!({"defect": f.name, "ply": f.ply, "zone": f.zone, "at": f.at, "value": f.value, "by": f.by})
+}
+
+fn limit_json(j: &Judged) -> serde_json::Value {
+    json!({
+        "of": j.of, "place": j.place, "limit": j.on.name(), "value": j.limit, "unit": j.on.unit(), "verdict": j.verdict.word(),
+        "worst": j.worst.as_ref().map(finding_json), "beyond": j.beyond.iter().map(finding_json).collect::<Vec<_>>(),
+        "by": j.by, "notes": j.notes,
+    })
+}
+
+fn as_json(
+    session: &Session<'_>,
+    rows: &[Row],
+    records: &[(Id, Record)],
+    judged: &[Judged],
+) -> serde_json::Value {
     let results: Vec<_> = rows
         .iter()
         .map(|r| {
@@ -117,7 +154,8 @@ fn as_json(session: &Session<'_>, rows: &[Row], records: &[(Id, Record)]) -> ser
             })
         })
         .collect();
-    json!({"workflow": session.workflow.name, "results": results, "steps": costs})
+    let limits: Vec<_> = judged.iter().map(limit_json).collect();
+    json!({"workflow": session.workflow.name, "results": results, "steps": costs, "limits": limits})
 }
 
 /// Whether the name of a step in the file, or of one at a point of a study, is among `wanted`.
@@ -133,7 +171,7 @@ pub fn is_named(session: &Session<'_>, step: &str, wanted: &[String]) -> bool {
     is(step) || of(step).is_some_and(|base| is(&base))
 }
 
-fn as_csv(rows: &[Row]) -> String {
+fn as_csv(rows: &[Row], judged: &[Judged]) -> String {
     let mut out = String::from(
         "step,item,result,value,unit,measured,expected,tolerance,minimum,maximum,verdict,source\n",
     );
@@ -156,20 +194,52 @@ fn as_csv(rows: &[Row]) -> String {
         ];
         out += &(cells.join(",") + "\n");
     }
+    for j in judged {
+        out += &(limit_cells(j).join(",") + "\n");
+    }
     out
+}
+
+/// A limit as a row of the table for programs: its step is `limits`, its item the place for which it holds.
+fn limit_cells(j: &Judged) -> [String; 12] {
+    let of = [
+        Some(j.of.as_str()).filter(|of| !of.is_empty()),
+        j.place.as_deref(),
+    ];
+    let of: Vec<&str> = of.into_iter().flatten().collect();
+    let bound = |is_least| match (j.on == LimitOn::ShearNegative) == is_least {
+        true => j.limit.to_string(),
+        false => String::new(),
+    };
+    let worst = j.worst.as_ref();
+    [
+        "limits".into(),
+        csv_text(&of.join("/")),
+        j.on.name().into(),
+        worst.map(|f| f.value.to_string()).unwrap_or_default(),
+        csv_text(j.on.unit()),
+        "false".into(),
+        String::new(),
+        String::new(),
+        bound(true),
+        bound(false),
+        j.verdict.word().into(),
+        csv_text(&worst.map(Finding::place).unwrap_or_default()),
+    ]
 }
 
 /// `plyflow results`.
 ///
 /// # Errors
-/// [`exit::EXPECTATION`] with `--check` when one is missed or not judged; [`exit::DAMAGED`] when a number is not shown because its record is
+/// [`exit::EXPECTATION`] with `--check` when an expectation or a limit is missed or not judged; [`exit::DAMAGED`] when a number is not shown because its record is
 /// damaged.
 pub fn results(args: &ResultsArgs) -> Done {
     let opened = open(&args.workflow)?;
     opened.step_indices(&args.step)?;
     let mut session = opened.look()?;
-    // Numbers are printed from records; the front reads artifacts.
-    let depth = if args.front {
+    // Numbers are printed from records; the front and the limits read artifacts.
+    let limited = opened.workflow.limits.is_some() && args.step.is_empty();
+    let depth = if args.front || limited {
         Depth::Artifacts
     } else {
         Depth::Records
@@ -178,9 +248,14 @@ pub fn results(args: &ResultsArgs) -> Done {
     tell_gone(&session);
     let mut records = records(&session);
     let mut rows = rows(&session, &records);
+    let judged = match limited {
+        true => told_by(args, &opened, &session, records.clone()).judged,
+        false => Vec::new(),
+    };
     if args.study {
         let told = super::study::tell(args, &session, &records);
-        return concluded(checked(told, args.check, &rows), &damages, &args.workflow);
+        let told = checked(told, args.check, &rows, &judged);
+        return concluded(told, &damages, &args.workflow);
     }
     if !args.step.is_empty() {
         let over = |r: &Row| r.expected.as_ref().map_or(vec![], |e| e.mean_over.clone());
@@ -196,20 +271,46 @@ pub fn results(args: &ResultsArgs) -> Done {
         return concluded(told, &damages, &args.workflow);
     }
     let told = match args.format {
-        Format::Json => print(&format!("{:#}\n", as_json(&session, &rows, &records))),
-        Format::Csv => print(&as_csv(&rows)),
+        Format::Json => print(&format!(
+            "{:#}\n",
+            as_json(&session, &rows, &records, &judged)
+        )),
+        Format::Csv => print(&as_csv(&rows, &judged)),
         Format::Table if records.is_empty() && !damages.is_empty() => Ok(()),
         Format::Table if records.is_empty() => {
             let text = nothing_yet(&session, &args.step, &args.workflow);
             print(&format!("{text}\n"))
         }
         Format::Table => print(&format!(
-            "{}\n{}",
+            "{}{}\n{}",
+            limits_text(&judged),
             results_table(&rows),
             cost_table(&session, &records)
         )),
     };
-    concluded(checked(told, args.check, &rows), &damages, &args.workflow)
+    let told = checked(told, args.check, &rows, &judged);
+    concluded(told, &damages, &args.workflow)
+}
+
+/// What a report would be made of.
+fn told_by(
+    args: &ResultsArgs,
+    opened: &Opened,
+    session: &Session<'_>,
+    records: Vec<(Id, Record)>,
+) -> ReportInput {
+    let found = Found {
+        records,
+        rows: Vec::new(),
+    };
+    let page = beside(&opened.workflow.file, &[]);
+    input(
+        opened,
+        session,
+        &found,
+        &[],
+        (&args.workflow, &[][..], page.as_path()),
+    )
 }
 
 /// `plyflow results --front`, of the comparisons among `records`.
@@ -219,13 +320,7 @@ fn front(
     session: &Session<'_>,
     records: Vec<(Id, Record)>,
 ) -> Done {
-    let found = Found {
-        records,
-        rows: Vec::new(),
-    };
-    let page = beside(&opened.workflow.file, &[]);
-    let asked = (&args.workflow, &[][..], page.as_path());
-    let ways = plyflow_report::ways(&input(opened, session, &found, &[], asked));
+    let ways = plyflow_report::ways(&told_by(args, opened, session, records));
     match args.format {
         Format::Json => print(&format!("{:#}\n", super::front::as_json(&ways))),
         Format::Csv => print(&super::front::as_csv(&ways)),
@@ -238,12 +333,16 @@ fn front(
 ///
 /// # Errors
 /// [`exit::EXPECTATION`], else what printing ended with.
-pub fn checked(told: Done, asked: bool, rows: &[Row]) -> Done {
-    if asked { check(rows).and(told) } else { told }
+pub fn checked(told: Done, asked: bool, rows: &[Row], judged: &[Judged]) -> Done {
+    if asked {
+        check(rows, judged).and(told)
+    } else {
+        told
+    }
 }
 
-/// Ends with the code for missed expectations if there are any, or any that could not be judged.
-fn check(rows: &[Row]) -> Done {
+/// Ends with the code for missed expectations if an expectation is missed or a limit exceeded, or could not be judged.
+fn check(rows: &[Row], judged: &[Judged]) -> Done {
     let mut parts = Vec::new();
     for (verdict, why) in [(Verdict::Missed, ""), (Verdict::NotJudged, " (no value)")] {
         let found = rows.iter().filter(|r| r.verdict() == Some(verdict));
@@ -257,6 +356,7 @@ fn check(rows: &[Row]) -> Done {
             ));
         }
     }
+    parts.extend(failing(judged));
     if parts.is_empty() {
         return Ok(());
     }

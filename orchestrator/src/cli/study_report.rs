@@ -12,7 +12,8 @@ use crate::said::{Done, Stop, print};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::job::Record;
 use plyflow_report::{
-    Family, Fate, Origin, Point, ReportInput, Response, Sampled, Value, Variable, write_report,
+    Family, Fate, Judged, Origin, Point, ReportInput, Response, Sampled, Value, Variable,
+    write_report,
 };
 use plyflow_workflow::resolved::{ResponseFrom, Study, StudyResponse, StudyValue};
 
@@ -196,6 +197,21 @@ fn unknown(name: &str, study: &Study) -> String {
     )
 }
 
+/// How the limits fared at one point.
+fn judged_at(whole: &ReportInput, title: &str) -> Vec<Judged> {
+    let of_point = |j: &Judged| {
+        let rest = j.of.strip_prefix(title)?;
+        let of = match rest.strip_prefix(", ") {
+            Some(of) => of,
+            None if rest.is_empty() => "",
+            None => return None,
+        };
+        let of = of.to_owned();
+        Some(Judged { of, ..j.clone() })
+    };
+    whole.judged.iter().filter_map(of_point).collect()
+}
+
 /// The report of one point: as that of a workflow with its values.
 fn of_point(session: &Session<'_>, whole: &ReportInput, at: usize) -> ReportInput {
     let core = &session.core;
@@ -236,6 +252,7 @@ fn of_point(session: &Session<'_>, whole: &ReportInput, at: usize) -> ReportInpu
             .cloned()
             .collect(),
         not_run: open.count(),
+        judged: judged_at(whole, title),
         family: None,
         ..whole.clone()
     }

@@ -312,6 +312,7 @@ pub(crate) mod tests {
             description: None,
             steps,
             expectations: vec![],
+            limits: None,
             on_failure: FailurePolicy::KeepGoing,
             study: None,
             confirming: None,

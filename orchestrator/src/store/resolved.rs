@@ -18,7 +18,7 @@ use std::borrow::Cow;
 use std::os::unix::fs::MetadataExt;
 
 /// Changes whenever the form of the file does.
-const FORM: &[u8] = b"plyflow resolved workflow 4";
+const FORM: &[u8] = b"plyflow resolved workflow 5";
 
 /// What a resolution depends on besides its [`Evidence`], as one hash.
 pub type Circumstances = [u8; 32];
@@ -133,6 +133,8 @@ struct Packed<'a> {
     #[serde(borrow)]
     steps: Vec<PackedStep<'a>>,
     expectations: Vec<Expectation>,
+    /// As JSON: its form has optional keys, which this one cannot tell.
+    limits: Option<String>,
     fail_fast: bool,
     study: Option<Study>,
 }
@@ -255,6 +257,8 @@ impl Packed<'_> {
             libraries,
             steps,
             expectations: workflow.expectations.clone(),
+            // Numbers and texts: it can be written.
+            limits: (workflow.limits.as_ref()).and_then(|l| serde_json::to_string(l).ok()),
             fail_fast: workflow.on_failure == FailurePolicy::FailFast,
             study: workflow.study.clone(),
         }
@@ -286,6 +290,7 @@ impl Packed<'_> {
                 retries: s.retries,
             })
         };
+        let limits = self.limits.map(|l| serde_json::from_str(&l));
         let recipes = self.steps.iter().map(|s| s.recipe).collect();
         let workflow = ResolvedWorkflow {
             name: self.name,
@@ -293,6 +298,7 @@ impl Packed<'_> {
             description: self.description,
             steps: self.steps.into_iter().map(step).collect::<Option<_>>()?,
             expectations: self.expectations,
+            limits: limits.transpose().ok()?,
             on_failure: if self.fail_fast {
                 FailurePolicy::FailFast
             } else {

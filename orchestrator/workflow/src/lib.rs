@@ -11,6 +11,7 @@ mod expect;
 mod gathered;
 mod graph;
 mod hints;
+mod limits;
 mod load;
 mod overrides;
 mod parameters;

@@ -8,6 +8,7 @@ use crate::draft::{Draft, WORKFLOW};
 use crate::evidence::{Evidence, Resolution};
 use crate::expect;
 use crate::hints::other_format;
+use crate::limits;
 use crate::overrides::{self, Override};
 use crate::parameters::{Place, Resolver, absolute, find};
 use crate::resolved::{FailurePolicy, ResolvedInput, ResolvedStep, ResolvedWorkflow, Resources};
@@ -193,6 +194,7 @@ fn load_into(
         }
         _ => expectations.of_results,
     };
+    let limits = limits::limits(&root, &steps, &source, problems);
     let workflow = ResolvedWorkflow {
         name: root.get("name")?.text()?.to_owned(),
         file: absolute(&source.folder, path.file_name()?),
@@ -202,6 +204,7 @@ fn load_into(
             .map(str::to_owned),
         steps,
         expectations,
+        limits,
         on_failure: on_failure(&root),
         study,
         confirming,

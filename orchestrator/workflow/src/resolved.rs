@@ -3,7 +3,7 @@
 
 use camino::Utf8PathBuf;
 use plyflow_model::artifact::{self, StudyOrigin, Variation};
-use plyflow_model::workflow::{FamilyOf, ResponseOf};
+use plyflow_model::workflow::{FamilyOf, Limits, ResponseOf};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fmt;
@@ -424,6 +424,8 @@ pub struct ResolvedWorkflow {
     pub steps: Vec<ResolvedStep>,
     /// Expectations.
     pub expectations: Vec<Expectation>,
+    /// How large defects may be, if that is said. No key hangs on it.
+    pub limits: Option<Limits>,
     /// Failure policy.
     pub on_failure: FailurePolicy,
     /// Its study, if it is one.

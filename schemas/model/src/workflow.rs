@@ -6,10 +6,12 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
+mod limits;
 mod optimise;
 mod stated;
 mod study;
 
+pub use limits::{LimitOn, LimitPlace, LimitValues, Limits};
 pub use optimise::{Optimise, OptimiseMethod};
 pub use stated::{OnFailure, ResultValue, Stated};
 pub use study::{
@@ -53,6 +55,9 @@ pub struct Workflow {
     #[serde(default, skip_serializing_if = "Expectations::is_empty")]
     #[schemars(extend("x-expected" = "a list of expectations, or the path of a JSON file with them"))]
     pub expect: Expectations,
+    /// How large defects may be for the part to be good; left out: nothing is judged.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limits: Option<Limits>,
 }
 
 /// One step.

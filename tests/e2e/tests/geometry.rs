@@ -152,6 +152,50 @@ fn a_tool_and_outlines_of_a_step_form_as_the_file_and_the_points_they_come_from_
         made.values("local", "cycles"),
         listed.values("local", "cycles")
     );
+    limits_are_judged_and_run_nothing_again(&listed);
+}
+
+/// Of a study that has run: limits that are written afterwards.
+fn limits_are_judged_and_run_nothing_again(study: &Study) {
+    let with = |limits: &str| study.write(&(chain(["", "", ""]) + "limits:" + limits));
+    let code = || study.call(&["results", "--check"]).status.code();
+    with(" {shear: 90 deg, fibre_strain: 1}\n");
+    assert_eq!(study.run(&["--check"]), well(0, 7));
+    assert_eq!(code(), Some(0));
+    // The elements of the zone are membranes, and no fold of theirs is a wrinkle.
+    with(
+        " {wrinkle_height: 1 m, places: [{ply: ply_1, rectangle: {length: 50 mm, width: 60 mm}, shear: 0 deg}]}\n",
+    );
+    let ended = study.run(&["--check"]);
+    assert_eq!((ended.code, ended.executed), (Some(5), 0));
+    assert_eq!(code(), Some(5));
+    let told = study.results();
+    let verdict = |limit: &str| {
+        let mut all = told["limits"].as_array().unwrap().iter();
+        let found = all.find(|l| l["limit"] == limit).unwrap();
+        (
+            found["verdict"].clone(),
+            found["place"].clone(),
+            found["by"].clone(),
+        )
+    };
+    let (height, place, _) = verdict("wrinkle_height");
+    assert_eq!(
+        (height.as_str(), place.as_str()),
+        (Some("not judged"), None)
+    );
+    let (shear, place, by) = verdict("shear");
+    assert_eq!(
+        (shear.as_str(), place.as_str()),
+        (Some("beyond"), Some("a rectangle of ply_1"))
+    );
+    assert_eq!(by, "1 fine run in its zone; coarse elsewhere");
+    with(" {shear: 1 mm, places: [{ply: plie, shear: 1 deg}]}\n");
+    let wrong = told(study, "plan");
+    assert!(
+        wrong.contains("workflow.yaml:") && wrong.contains("is a length"),
+        "{wrong}"
+    );
 }
 
 /// What `plyflow COMMAND` says of a study that cannot be run, or that warns.

@@ -47,6 +47,8 @@ pub(crate) struct Scene {
     pub(crate) tool: bool,
     /// What is shown coarser than it is, or not at all.
     pub(crate) notes: Vec<String>,
+    /// Whether the cells of all plies are those that were computed.
+    pub(crate) elements: bool,
     /// The fields of the menu.
     pub(crate) legends: Vec<Legend>,
     /// Fields that are the same everywhere, and those for which the page has no room.
@@ -178,6 +180,7 @@ pub(crate) fn scene(
     let plies = distinct(told.iter().filter_map(|b| b.ply.clone()));
     let zones = distinct(told.iter().filter_map(|b| b.zone.clone()));
     let tool = told.iter().any(|b| b.ply.is_none());
+    let elements = are_elements(&bodies, &told);
     let told = Told {
         extent,
         lift: shown.plies.iter().map(lift).fold(0.0, f64::max),
@@ -193,11 +196,18 @@ pub(crate) fn scene(
         zones,
         tool,
         notes,
+        elements,
         legends,
         even: others.even,
         left_out,
         defects: !places.is_empty(),
     }))
+}
+
+/// Whether the cells of all plies are those that were computed.
+fn are_elements(bodies: &[Body<'_>], told: &[ToldBody]) -> bool {
+    let mut pairs = bodies.iter().zip(told);
+    pairs.all(|(b, t)| b.ply.is_none() || t.points == b.formed.len())
 }
 
 /// Says how much of a mesh is shown, if that is not all of it.

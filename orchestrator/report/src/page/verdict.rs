@@ -18,26 +18,44 @@ pub(crate) enum Tone {
     Bad,
 }
 
-/// The verdict on a study.
+/// The verdict on a study in one line: what was found, then whether it can be trusted.
 pub(crate) fn of_study(study: &Study) -> (Tone, String) {
+    let (found, parts) = found_in(study);
+    let (trusted, told) = trusted(study);
+    let tone = match (trusted, found) {
+        (Tone::Bad, _) => Tone::Bad,
+        (_, true) => Tone::Found,
+        (tone, false) => tone,
+    };
+    (
+        tone,
+        parts.into_iter().chain(told).collect::<Vec<_>>().join("; "),
+    )
+}
+
+/// What was found in a study, in parts of a sentence, and whether that is anything.
+fn found_in(study: &Study) -> (bool, Vec<String>) {
     let mut parts = Vec::new();
-    let mut tone = Tone::Good;
+    let mut any = false;
     match &study.zones {
         Some(zones) if zones.is_empty() => parts.push(nothing_found(study)),
         Some(zones) => {
-            tone = Tone::Found;
+            any = true;
             parts.push(plural(zones.len(), "zone", "zones"));
+            parts.extend(study.comparison.iter().flat_map(defects));
         }
         None => {}
     }
-    if let Some(c) = &study.comparison {
-        if tone == Tone::Found {
-            parts.extend(defects(c));
-        }
-        if let Some(missed) = c.missed_text() {
-            tone = Tone::Found;
-            parts.push(format!("{missed} of the reference missed"));
-        }
+    (any, parts)
+}
+
+/// Whether what a study found can be trusted, in parts of a sentence.
+fn trusted(study: &Study) -> (Tone, Vec<String>) {
+    let mut parts = Vec::new();
+    let mut tone = Tone::Good;
+    if let Some(missed) = study.comparison.iter().find_map(|c| c.missed_text()) {
+        tone = Tone::Found;
+        parts.push(format!("{missed} of the reference missed"));
     }
     if let Some(confirmed) = &study.confirmed {
         if !confirmed.verdict.stays {
@@ -52,7 +70,48 @@ pub(crate) fn of_study(study: &Study) -> (Tone, String) {
         tone = Tone::Bad;
     }
     parts.extend(bad.into_iter().flatten());
-    (tone, parts.join("; "))
+    (tone, parts)
+}
+
+/// What was found in each study, for the first screen: sentences, with the study's name where there are several.
+pub(crate) fn found(material: &Material) -> Vec<String> {
+    let of = |study: &Study| sentence(study, found_in(study).1);
+    material.studies.iter().filter_map(of).collect()
+}
+
+/// Whether the answer can be trusted, for the first screen: sentences, and the worst of what they say.
+pub(crate) fn trust(material: &Material) -> (Tone, Vec<String>) {
+    let rank = |tone: &Tone| match tone {
+        Tone::Good => 0,
+        Tone::Found => 1,
+        Tone::Bad => 2,
+    };
+    let mut worst = Tone::Good;
+    let mut told = Vec::new();
+    for study in &material.studies {
+        let (tone, parts) = trusted(study);
+        if rank(&tone) > rank(&worst) {
+            worst = tone;
+        }
+        told.extend(sentence(study, parts));
+    }
+    let unsure =
+        |s: &Study| s.comparison.is_some() && s.confirmed.is_none() && s.reference.is_none();
+    if material.studies.iter().any(unsure) {
+        told.push("Not known: whether the defects stay in finer and wider zones. `plyflow run --confirm` tells.".into());
+    }
+    (worst, told)
+}
+
+/// Parts as a sentence about a study; `None` without parts.
+fn sentence(study: &Study, parts: Vec<String>) -> Option<String> {
+    let text = parts.join("; ");
+    let mut letters = text.chars();
+    let first = letters.next()?.to_uppercase();
+    Some(match study.title.is_empty() {
+        true => format!("{first}{}.", letters.as_str()),
+        false => format!("{}: {text}.", study.title),
+    })
 }
 
 /// Wrinkles and bridging of the local runs.

@@ -90,6 +90,9 @@ fn controls(scene: &Scene, n: usize) -> Markup {
     let switch = |kind: &str, value: &str, text: &str| {
         html! { label { input type="checkbox" checked data-show=(kind) value=(value); " " (text) } }
     };
+    let on_request = |kind: &str, text: &str| {
+        html! { label { input type="checkbox" data-show=(kind) value=""; " " (text) } }
+    };
     html! {
         div class="controls" {
             @if !scene.legends.is_empty() {
@@ -104,6 +107,11 @@ fn controls(scene: &Scene, n: usize) -> Markup {
             span class="group" role="group" aria-label="Bodies" {
                 @if scene.tool { (switch("tool", "", "Tool")) }
                 @for ply in &scene.plies { (switch("ply", ply, ply)) }
+            }
+            span class="group" role="group" aria-label="Lines" {
+                (on_request("edges", "Ply edges"))
+                // Of a mesh that is shown coarser than it is, the lines would be no elements.
+                @if scene.elements { (on_request("mesh", "Mesh")) }
             }
             @if !scene.zones.is_empty() {
                 span class="group" role="group" aria-label="Finer plies of zones" {

@@ -37,6 +37,7 @@ pub(crate) fn run(
     Some(Run {
         label: instance.label(),
         instance: at,
+        key: instance.record.key.clone(),
         facts: Forming {
             energy: told.energy,
             element_size: told.element_size.unwrap_or(0.0),

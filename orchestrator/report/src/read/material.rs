@@ -147,6 +147,7 @@ impl<'a> Reader<'a> {
         let mut study = Study {
             global: self.run(plan.global),
             detection: plan.detection.and_then(|at| self.attributes(at)),
+            detected_by: plan.detection,
             ..Study::default()
         };
         if !plan.zones.is_empty() {
@@ -233,6 +234,7 @@ impl<'a> Reader<'a> {
         Some(Run {
             label: self.links.instance(at).label(),
             instance: at,
+            key: self.links.key(at).to_owned(),
             facts: self.attributes(at)?,
             kinetic_bound: self.links.facts(at)?.kinetic_bound(),
             history: History::default(),

@@ -18,6 +18,8 @@ pub(crate) struct Study {
     pub(crate) plies: Vec<Ply>,
     /// What the detection tells of itself; absent without one.
     pub(crate) detection: Option<Defects>,
+    /// The instance of the detection.
+    pub(crate) detected_by: Option<usize>,
     /// Zones; absent when no step looked for them.
     pub(crate) zones: Option<Vec<Zone>>,
     /// One entry per zone with something to show.
@@ -41,6 +43,8 @@ pub(crate) struct Run {
     pub(crate) label: String,
     /// Index of its instance.
     pub(crate) instance: usize,
+    /// Key of its artifact.
+    pub(crate) key: String,
     /// Its attributes.
     pub(crate) facts: Forming,
     /// Bound on kinetic over internal energy that it was given.

@@ -58,6 +58,51 @@ const Scene3d = (() => {
     return normal;
   }
 
+  // Faces that meet at more than this are shaded each by itself: an edge of the tool is seen as one.
+  const CREASE = Math.cos((35 * Math.PI) / 180);
+
+  // A body whose triangles have points of their own, with normals that are smooth up to its sharp edges.
+  function creased(position, parts) {
+    const all = parts.flatMap((p) => p.triangles);
+    const corner = (i) => position.subarray(3 * i, 3 * i + 3);
+    const face = all.map(([a, b, c]) => {
+      const [p, q, r] = [a, b, c].map(corner);
+      const [e, f] = [[0, 1, 2].map((d) => q[d] - p[d]), [0, 1, 2].map((d) => r[d] - p[d])];
+      return [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
+    });
+    const size = face.map((n) => Math.hypot(...n) || 1);
+    const around = Array.from({ length: position.length / 3 }, () => []);
+    all.forEach((triangle, t) => triangle.forEach((i) => around[i].push(t)));
+    const points = new Float32Array(9 * all.length), normal = new Float32Array(9 * all.length);
+    all.forEach((triangle, t) => triangle.forEach((i, k) => {
+      const at = 9 * t + 3 * k;
+      points.set(corner(i), at);
+      for (const u of around[i]) {
+        const along = (face[t][0] * face[u][0] + face[t][1] * face[u][1] + face[t][2] * face[u][2]) / (size[t] * size[u]);
+        if (along >= CREASE || u === t) for (let d = 0; d < 3; d++) normal[at + d] += face[u][d];
+      }
+    }));
+    let next = 0;
+    const own = parts.map((p) => ({ ...p, triangles: p.triangles.map(() => [next++, next++, next++]) }));
+    return { points, normal, parts: own };
+  }
+
+  // Sides of cells, each once: pairs of points; with `rim` those of one cell alone.
+  function sides(parts, points, rim) {
+    const count = new Map();
+    for (const quads of parts) {
+      for (let i = 0; i < quads.length; i += 4) {
+        for (let k = 0; k < 4; k++) {
+          const [a, b] = [quads[i + k], quads[i + ((k + 1) % 4)]];
+          // The last corner of a triangle stands twice.
+          if (a !== b) count.set(Math.min(a, b) * points + Math.max(a, b), (count.get(Math.min(a, b) * points + Math.max(a, b)) ?? 0) + 1);
+        }
+      }
+    }
+    const kept = [...count].filter(([, n]) => !rim || n === 1);
+    return kept.map(([key]) => [Math.floor(key / points), key % points]);
+  }
+
   // Segments of lines as rectangles, to be widened on the screen.
   function ribbon(lines) {
     const from = [], to = [], corner = [], elements = [];
@@ -140,9 +185,22 @@ const Scene3d = (() => {
       depth: { enable: regl.prop('hide') },
       blend: { enable: true, func: { src: 'one', dst: 'one minus src alpha' } },
     });
+    const wire = regl({
+      vert: `${PROJECT} attribute vec3 position; void main() { gl_Position = project(position); }`,
+      frag: 'precision highp float; uniform vec4 colour; void main() { gl_FragColor = vec4(colour.rgb * colour.a, colour.a); }',
+      attributes: { position: regl.prop('position') },
+      uniforms: { ...camera, colour: regl.prop('colour'), lift: regl.prop('lift') },
+      elements: regl.prop('elements'),
+      blend: { enable: true, func: { src: 'one', dst: 'one minus src alpha' } },
+    });
     const within = regl({ context: Object.fromEntries(CAMERA.map((n) => [n, regl.prop(n)])) });
-    return { surface, line, within };
+    return { surface, line, wire, within };
   }
+
+  const once = (make) => {
+    let made;
+    return () => (made ??= make());
+  };
 
   function upload(regl, scene) {
     const stripe = (stops) => {
@@ -155,12 +213,21 @@ const Scene3d = (() => {
       return regl.texture({ width: 256, height: 1, data, mag: 'linear', min: 'linear' });
     };
     const bodies = scene.bodies.map((body) => {
-      const parts = body.parts.map((p) => ({ zone: p.zone, triangles: triangles(p.quads) })).filter((p) => p.triangles.length);
+      let parts = body.parts.map((p) => ({ zone: p.zone, quads: p.quads, triangles: triangles(p.quads) })).filter((p) => p.triangles.length);
+      let [points, normal] = [body.position, null];
+      // What has no field may have points more than once.
+      if (!body.ply && !body.fields.size) ({ points, normal, parts } = creased(points, parts));
       return {
         ...body,
-        normal: regl.buffer(normals(body.position, parts)),
-        position: regl.buffer(body.position),
-        parts: parts.map((p) => ({ zone: p.zone, elements: regl.elements({ data: p.triangles, type: 'uint32' }) })),
+        normal: regl.buffer(normal ?? normals(points, parts)),
+        position: regl.buffer(points),
+        // Made when they are asked for: most readers look at the surface alone.
+        rim: once(() => ribbon(sides(parts.map((p) => p.quads), body.points, true).map((pair) => Float32Array.from(pair.flatMap((i) => [...body.position.subarray(3 * i, 3 * i + 3)]))))),
+        parts: parts.map((p) => ({
+          zone: p.zone,
+          elements: regl.elements({ data: p.triangles, type: 'uint32' }),
+          mesh: once(() => regl.elements({ primitive: 'lines', data: sides([p.quads], body.points, false), type: 'uint32' })),
+        })),
         fields: new Map([...body.fields].map(([k, values]) => [k, regl.buffer(values)])),
       };
     });

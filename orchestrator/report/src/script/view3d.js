@@ -13,7 +13,7 @@
       Object.assign(this, { element, canvas, told, regl, paint, scene });
       this.plies = data.bodies.filter((b) => b.ply && !b.zone);
       this.radius = Math.hypot(...told.extent.size) / 2;
-      this.show = { tool: true, ply: new Set(), zone: new Set(), field: 0, defect: null };
+      this.show = { tool: true, mesh: false, edges: false, ply: new Set(), zone: new Set(), field: 0, defect: null };
       this.waiting = false;
     }
 
@@ -126,7 +126,13 @@
           // Where both are drawn, at the rim of a zone, the finer ply is seen.
           const lift = body.ply ? this.told.lift + (body.zone ? 0.0008 : 0) : 0;
           const how = { place, coloured: Boolean(place), colours: scene.stripes[show.field], lift };
-          for (const part of body.parts.filter((p) => !this.showsZone(p.zone))) this.paint.surface({ ...body, ...part, ...how });
+          const parts = body.parts.filter((p) => !this.showsZone(p.zone));
+          for (const part of parts) this.paint.surface({ ...body, ...part, ...how });
+          if (!body.ply) continue;
+          const over = { position: body.position, colour: [0, 0, 0, 0.45], lift: lift + 0.0006 };
+          if (show.mesh) for (const part of parts) this.paint.wire({ ...over, elements: part.mesh() });
+          // The finer ply of a zone ends at the zone's cut, which is no edge of the ply.
+          if (show.edges && !body.zone) this.paint.line({ ...body.rim(), width: 1.8, colour: [0, 0, 0, 1], hide: true, lift: lift + 0.001 });
         }
         for (const outline of this.outlines()) this.stroke(outline.ribbon, 1.2, [0, 0, 0], 0.15);
         if (this.chosen()) this.stroke(this.chosen().ribbon, 3, PICK, 0.6);
@@ -189,7 +195,7 @@
     for (const box of element.querySelectorAll('input[data-show]')) {
       const change = () => {
         const kind = box.dataset.show;
-        if (kind === 'tool') show.tool = box.checked;
+        if (typeof show[kind] === 'boolean') show[kind] = box.checked;
         else if (box.checked) show[kind].add(box.value);
         else show[kind].delete(box.value);
         view.later();

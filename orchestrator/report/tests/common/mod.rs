@@ -528,6 +528,8 @@ impl Study {
             given: "workflow.yaml --set 'coarse.element=m4 & <x>'".into(),
             program: "plyflow 0.1.0".into(),
             fingerprint: "0123abcd".into(),
+            limits: None,
+            judged: vec![],
             expectations: vec![
                 expectation("zones", "zone_count", Some(2.0), "1", true),
                 expectation("coarse", "penetration_max", Some(2.1e-4), "m", false),

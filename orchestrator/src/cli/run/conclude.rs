@@ -172,7 +172,7 @@ fn tell_results(args: &RunArgs, opened: &Opened, session: &Session<'_>, summary:
         true => print(&(of_study + &plyflow_report::summary(&input, written.as_deref()) + "\n")),
         false => Ok(()),
     };
-    checked(told, args.check, &found.rows)
+    checked(told, args.check, &found.rows, &input.judged)
 }
 
 /// The files of the study's table: at the end of every run of the whole they tell what is, also when the study has only got smaller.

@@ -134,6 +134,11 @@ expect:
   - {step: comparison, result: zone_count, minimum: 1, source: "thesis 5.5.2"}
   - {step: coarse, result: kinetic_ratio, maximum: 0.05}
   - {step: comparison, result: wrinkle_length.AW1, value: 68 mm, tolerance: 7 mm}
+limits:
+  wrinkle_height: 1 mm
+  shear_negative: -50 deg
+  places:
+    - {ply: ply-1, rectangle: {length: 100 mm, width: 50 mm}, wrinkle_height: 2 mm}
 "#;
 
 pub const SCENE: &str = r#"plyflow_scene: 1

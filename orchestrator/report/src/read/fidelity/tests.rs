@@ -39,6 +39,8 @@ fn input(instances: Vec<Instance>) -> ReportInput {
         program: "plyflow".into(),
         fingerprint: "f".into(),
         instances,
+        limits: None,
+        judged: Vec::new(),
         expectations: Vec::new(),
         failures: Vec::new(),
         not_run: 0,

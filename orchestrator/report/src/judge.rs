@@ -1,0 +1,127 @@
+//! The limits of the engineer, held against what the steps have found.
+//!
+//! A limit is judged where the finest model has looked: in the zones by their fine runs, elsewhere by the run of the whole part. What nobody
+//! has looked at closely enough is not judged, and said to be so.
+
+mod defects;
+mod evidence;
+mod fields;
+mod governed;
+
+use crate::family::Fate;
+use crate::input::ReportInput;
+use crate::judged::{Finding, Judged};
+use crate::read::{Material, Study};
+use evidence::Evidence;
+use governed::Governed;
+use plyflow_model::workflow::{LimitOn, Limits};
+use std::cmp::Ordering;
+
+/// Holds the limits of a workflow against what its artifacts tell, which are read for it; nothing without limits. Of a study every point is
+/// judged by itself.
+#[must_use]
+pub fn judge(input: &ReportInput) -> Vec<Judged> {
+    let Some(limits) = &input.limits else {
+        return Vec::new();
+    };
+    let Some(family) = &input.family else {
+        return of_run(input, limits);
+    };
+    let mut all = Vec::new();
+    for point in &family.points {
+        let instances = point.instances.iter();
+        let own = ReportInput {
+            instances: instances.map(|i| input.instances[*i].clone()).collect(),
+            family: None,
+            ..input.clone()
+        };
+        let judged = match point.fate {
+            Fate::Done => of_run(&own, limits),
+            Fate::Failed { .. } => unjudged(limits, "a step of this point has failed"),
+            Fate::NotRun => unjudged(limits, "not all steps of this point have run"),
+        };
+        all.extend(judged.into_iter().map(|j| {
+            let of = match j.of.is_empty() {
+                true => point.name.clone(),
+                false => format!("{}, {}", point.name, j.of),
+            };
+            Judged { of, ..j }
+        }));
+    }
+    all
+}
+
+/// All limits without a verdict.
+fn unjudged(limits: &Limits, why: &str) -> Vec<Judged> {
+    let evidence = |_| Evidence::none(why);
+    Governed::new(limits, &[]).judged("", evidence)
+}
+
+fn of_run(input: &ReportInput, limits: &Limits) -> Vec<Judged> {
+    let material = Material::read(input, false);
+    let studies = judged_studies(&material);
+    if studies.is_empty() {
+        return unjudged(limits, "no step has formed plies yet");
+    }
+    let mut all = Vec::new();
+    for study in &studies {
+        let sheets = study.global.as_ref().map(|g| g.facts.sheets.as_slice());
+        let governed = Governed::new(limits, sheets.unwrap_or_default());
+        let of = if studies.len() > 1 { &study.title } else { "" };
+        let defects = defects::Look::new(input, &material, study);
+        let fields = fields::Look::new(input, &material, study);
+        all.extend(governed.judged(of, |on| match on {
+            LimitOn::WrinkleHeight
+            | LimitOn::WrinkleLength
+            | LimitOn::BridgingGap
+            | LimitOn::BridgingArea => defects.evidence(on, limits),
+            _ => fields.evidence(on, &governed),
+        }));
+    }
+    all
+}
+
+/// The wrinkles by their heights and the bridging by its gaps that were found, each the largest first: what is told where there are no limits.
+pub(crate) fn largest(input: &ReportInput, material: &Material) -> Vec<(LimitOn, Finding)> {
+    let none = Limits::default();
+    let mut all = Vec::new();
+    for on in [LimitOn::WrinkleHeight, LimitOn::BridgingGap] {
+        for study in judged_studies(material) {
+            let evidence = defects::Look::new(input, material, study).evidence(on, &none);
+            let named = evidence.findings.into_iter().filter(|f| f.name.is_some());
+            all.extend(named.map(|f| (on, f)));
+        }
+    }
+    all.sort_by(|a, b| {
+        (a.0, b.1.value)
+            .partial_cmp(&(b.0, a.1.value))
+            .unwrap_or(Ordering::Equal)
+    });
+    all
+}
+
+/// The runs that are judged: those that something looked at; else those of a solver, else all. A drape by geometry that stands beside a run
+/// with forces says nothing that the run does not say better.
+pub(crate) fn judged_studies(material: &Material) -> Vec<&Study> {
+    let all = || material.studies.iter().filter(|s| s.global.is_some());
+    let looked_at: Vec<&Study> = all().filter(|s| is_looked_at(material, s)).collect();
+    if !looked_at.is_empty() {
+        return looked_at;
+    }
+    let has_forces = |s: &&Study| {
+        let net = |g: &crate::read::Run| g.facts.net_spacing.is_some();
+        !s.global.as_ref().is_some_and(net)
+    };
+    let solved: Vec<&Study> = all().filter(has_forces).collect();
+    if solved.is_empty() {
+        all().collect()
+    } else {
+        solved
+    }
+}
+
+fn is_looked_at(material: &Material, study: &Study) -> bool {
+    study.detection.is_some()
+        || study.comparison.is_some()
+        || !defects::measurements(material, study).is_empty()
+}

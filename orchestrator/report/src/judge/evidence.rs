@@ -1,0 +1,26 @@
+//! What was looked at for a limit.
+
+use crate::judged::Finding;
+
+/// What was looked at for a limit, before it is asked where that limit holds.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Evidence {
+    /// What was found, of every size.
+    pub(crate) findings: Vec<Finding>,
+    /// Who has looked.
+    pub(crate) by: Vec<String>,
+    /// Why something has not been looked at.
+    pub(crate) open: Vec<String>,
+    /// What is to be known all the same.
+    pub(crate) notes: Vec<String>,
+}
+
+impl Evidence {
+    /// Without anybody who has looked.
+    pub(crate) fn none(why: impl Into<String>) -> Self {
+        Self {
+            open: vec![why.into()],
+            ..Self::default()
+        }
+    }
+}

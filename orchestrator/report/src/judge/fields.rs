@@ -1,0 +1,194 @@
+//! Shear and fibre strain: in every cell of the finest run that has it.
+
+use super::evidence::Evidence;
+use super::governed::Governed;
+use crate::input::ReportInput;
+use crate::judged::{Finding, size};
+use crate::read::{Material, Run, Study, last_frame, open, quads};
+use crate::units::{plural, quantity};
+use plyflow_artifact::{Artifact, On};
+use plyflow_model::artifact::Zone;
+use plyflow_model::workflow::LimitOn;
+use std::collections::BTreeMap;
+
+/// The cells of a ply of a run, by what is limited of them.
+struct Sheet {
+    ply: String,
+    /// `[cells][x, y]` (m), their middles in the flat ply.
+    at: Vec<[f64; 2]>,
+    /// `[cells]` (rad); none where the run does not tell it.
+    shear: Option<Vec<f64>>,
+    /// `[cells]` (1), of both families the larger by size; none where the run does not tell it.
+    strain: Option<Vec<f64>>,
+    /// Undeformed area that has no shape (m2).
+    undraped: f64,
+}
+
+/// A run with its cells.
+struct Looked<'a> {
+    run: &'a Run,
+    /// Of the fine run of a zone.
+    zone: Option<&'a Zone>,
+    /// The plies, or why they cannot be read.
+    plies: Result<Vec<Sheet>, String>,
+}
+
+/// The runs of a study with what their cells tell.
+pub(super) struct Look<'a> {
+    runs: Vec<Looked<'a>>,
+    zones: Vec<&'a Zone>,
+}
+
+impl<'a> Look<'a> {
+    pub(super) fn new(input: &ReportInput, _: &Material, study: &'a Study) -> Self {
+        let zones = study.zones.as_deref().unwrap_or_default();
+        let whole = study.global.iter().map(|run| (run, None));
+        let locals = study.locals.iter();
+        let locals = locals.map(|l| (&l.run, zones.iter().find(|z| z.name == l.zone)));
+        let runs: Vec<Looked<'a>> = (whole.chain(locals))
+            .map(|(run, zone)| Looked {
+                run,
+                zone,
+                plies: sheets(input, run),
+            })
+            .collect();
+        let zones = runs.iter().filter_map(|r| r.zone).collect();
+        Self { runs, zones }
+    }
+
+    /// What all cells tell of a quantity: for each run, ply and place of the limits the worst one.
+    pub(super) fn evidence(&self, on: LimitOn, governed: &Governed<'_>) -> Evidence {
+        let mut all = Evidence::default();
+        for looked in &self.runs {
+            let label = &looked.run.label;
+            let plies = match &looked.plies {
+                Ok(plies) => plies,
+                Err(why) => {
+                    all.open.push(format!("{label} cannot be read: {why}"));
+                    continue;
+                }
+            };
+            for ply in plies {
+                let (values, what) = match on {
+                    LimitOn::FibreStrain => (&ply.strain, "strains of fibres"),
+                    _ => (&ply.shear, "shear angles"),
+                };
+                let Some(values) = values else {
+                    let text = format!("{label} tells no {what} of {}", ply.ply);
+                    all.open.push(text);
+                    continue;
+                };
+                if ply.undraped > 0.0 {
+                    let area = quantity(ply.undraped, "m2", 3);
+                    let text = format!("{area} of {} are not draped in {label}", ply.ply);
+                    all.open.push(text);
+                }
+                all.findings
+                    .extend(self.worst(on, looked, ply, values, governed));
+            }
+        }
+        all.by = self.by();
+        all
+    }
+
+    /// The worst cell of a ply at each place of the limits, of those in which no finer run has looked.
+    fn worst(
+        &self,
+        on: LimitOn,
+        looked: &Looked<'_>,
+        ply: &Sheet,
+        values: &[f64],
+        governed: &Governed<'_>,
+    ) -> Vec<Finding> {
+        let mut worst: BTreeMap<Option<usize>, (f64, [f64; 2])> = BTreeMap::new();
+        for (value, at) in values.iter().zip(&ply.at) {
+            let finer = looked.zone.is_none() && self.zones.iter().any(|z| z.holds(at, 0.0));
+            let Some(place) = governed.place_at(on, &ply.ply, *at).filter(|_| !finer) else {
+                continue;
+            };
+            let known = worst.entry(place).or_insert((*value, *at));
+            if size(on, *value) > size(on, known.0) {
+                *known = (*value, *at);
+            }
+        }
+        let finding = |(value, at)| Finding {
+            name: None,
+            ply: ply.ply.clone(),
+            zone: looked.zone.map(|z| z.name.clone()),
+            at,
+            value,
+            by: looked.run.label.clone(),
+            at_cut: false,
+            cause: None,
+            crest_shear: None,
+        };
+        worst.into_values().map(finding).collect()
+    }
+
+    fn by(&self) -> Vec<String> {
+        let fine = self.runs.iter().filter(|r| r.zone.is_some()).count();
+        let whole = self.runs.iter().find(|r| r.zone.is_none());
+        let mut by = Vec::new();
+        if fine > 0 {
+            by.push(plural(
+                fine,
+                "fine run in its zone",
+                "fine runs in their zones",
+            ));
+        }
+        by.extend(whole.map(|w| match fine {
+            0 => w.run.label.clone(),
+            _ => format!("{} elsewhere", w.run.label),
+        }));
+        by
+    }
+}
+
+/// The plies of a run in its last frame.
+fn sheets(input: &ReportInput, run: &Run) -> Result<Vec<Sheet>, String> {
+    let path = &input.instances[run.instance].artifact;
+    let artifact = open(path).map_err(|e| e.to_string())?;
+    let plies = run.facts.plies();
+    plies.map(|p| sheet(&artifact, &p.name)).collect()
+}
+
+fn sheet(artifact: &Artifact, name: &str) -> Result<Sheet, String> {
+    let said = |e: &dyn std::fmt::Display| e.to_string();
+    let frame = last_frame(artifact).map_err(|e| said(&e))?;
+    let body = artifact.body(name).map_err(|e| said(&e))?;
+    let (flat, cells) = artifact.mesh(name).map_err(|e| said(&e))?;
+    let cells = quads(name, &cells, body.nodes_per_cell).map_err(|e| said(&e))?;
+    let field = |what: &str| {
+        let values = artifact.frame_field(name, frame, On::Cells, what).ok();
+        values.filter(|v| v.len() == cells.len())
+    };
+    // What is not draped has no shear, though noughts stand there.
+    let draped = field("draped");
+    let kept: Vec<usize> = (0..cells.len())
+        .filter(|i| draped.as_ref().is_none_or(|d| d[*i] > 0.5))
+        .collect();
+    let of_kept = |values: Vec<f64>| kept.iter().map(|i| values[*i]).collect::<Vec<f64>>();
+    let larger = |(a, b): (f64, f64)| if b.abs() > a.abs() { b } else { a };
+    let strain = match (field("fibre_strain_1"), field("fibre_strain_2")) {
+        (Some(a), Some(b)) => Some(a.into_iter().zip(b).map(larger).collect()),
+        (a, b) => a.or(b),
+    };
+    let corners = |i: usize| cells[i].map(|n| flat[n as usize]);
+    let middle = |i: &usize| {
+        let c = corners(*i);
+        [0, 1].map(|d| c.iter().map(|p| p[d]).sum::<f64>() / 4.0)
+    };
+    let area = |i: usize| {
+        let [a, b, c, d] = corners(i);
+        let (e, f) = ([c[0] - a[0], c[1] - a[1]], [d[0] - b[0], d[1] - b[1]]);
+        0.5 * (e[0] * f[1] - e[1] * f[0]).abs()
+    };
+    let bare = |i: &usize| draped.as_ref().is_some_and(|d| d[*i] <= 0.5);
+    Ok(Sheet {
+        ply: name.to_owned(),
+        at: kept.iter().map(middle).collect(),
+        shear: field("shear_angle").map(of_kept),
+        strain: strain.map(of_kept),
+        undraped: (0..cells.len()).filter(bare).map(area).sum(),
+    })
+}

@@ -1,0 +1,187 @@
+//! Limits of the engineer on made-up runs: what is judged, by whom, and what the first screen says of it.
+
+mod common;
+
+use camino::{Utf8Path, Utf8PathBuf};
+use common::{ZONES, family, whole, whole_study};
+use plyflow_model::workflow::{LimitOn, Limits};
+use plyflow_report::{Judged, Kept, ReportInput, failing, judge, summary, write_report};
+use serde_json::{Value, json};
+
+fn folder() -> (tempfile::TempDir, Utf8PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    let path = Utf8PathBuf::from_path_buf(dir.path().to_owned()).unwrap();
+    (dir, path)
+}
+
+fn page(input: &ReportInput, folder: &Utf8Path) -> String {
+    let out = folder.join("out/report.html");
+    write_report(input, &out).unwrap();
+    std::fs::read_to_string(&out).unwrap()
+}
+
+/// The input with these limits, judged.
+fn with(mut input: ReportInput, limits: Value) -> ReportInput {
+    let limits: Limits = serde_json::from_value(limits).unwrap();
+    input.limits = Some(limits);
+    input.judged = judge(&input);
+    input
+}
+
+fn of(input: &ReportInput, on: LimitOn, place: Option<&str>) -> Judged {
+    let mut all = input.judged.iter();
+    let found = all.find(|j| j.on == on && j.place.as_deref() == place);
+    found
+        .unwrap_or_else(|| panic!("no {on:?} at {place:?}"))
+        .clone()
+}
+
+#[test]
+fn defects_are_judged_by_the_fine_runs_and_shear_by_every_cell_of_the_finest_run() {
+    let (_keep, folder) = folder();
+    let input = with(
+        whole(&folder),
+        json!({"wrinkle_length": "60 mm", "bridging_area": "500 mm2", "shear_positive": "20 deg", "shear_negative": "-40 deg"}),
+    );
+    let long = of(&input, LimitOn::WrinkleLength, None);
+    assert_eq!(long.verdict, Kept::Beyond);
+    let worst = long.worst.unwrap();
+    assert_eq!(
+        (worst.name.as_deref(), worst.zone.as_deref()),
+        (Some("AW1"), Some("A"))
+    );
+    assert_eq!(worst.by, "local.A", "the coarse run has it shorter");
+    assert!((worst.value - 0.0684).abs() < 1e-9);
+    // Nothing is beyond, but one place of bridging goes on behind the cut of its zone.
+    let area = of(&input, LimitOn::BridgingArea, None);
+    assert_eq!(area.verdict, Kept::NotJudged);
+    assert!(
+        area.notes[0].starts_with("BB1 reaches the cut of its zone"),
+        "{:?}",
+        area.notes
+    );
+    // 0.4 rad at a corner of the blank, which no zone has.
+    let shear = of(&input, LimitOn::ShearPositive, None);
+    let worst = shear.worst.unwrap();
+    assert_eq!((shear.verdict, worst.by.as_str()), (Kept::Beyond, "coarse"));
+    assert!(worst.value > 0.33 && worst.value < 0.4, "{}", worst.value);
+    let negative = of(&input, LimitOn::ShearNegative, None);
+    assert_eq!(negative.verdict, Kept::Within);
+    assert_eq!(
+        failing(&input.judged).unwrap(),
+        "2 limits exceeded: wrinkle length, positive shear angle; 1 limit not judged: bridging area"
+    );
+}
+
+#[test]
+fn in_a_zone_the_cells_of_the_whole_do_not_count() {
+    let (_keep, folder) = folder();
+    let [x0, y0, x1, y1] = ZONES[0].1;
+    let mm = |v: f64| format!("{} mm", 1e3 * v);
+    let zone = json!({"rectangle": {"centre": [mm((x0 + x1) / 2.0), mm((y0 + y1) / 2.0)],
+        "length": mm((x1 - x0) * 0.8), "width": mm((y1 - y0) * 0.8)}, "shear": "80 deg"});
+    let input = with(whole(&folder), json!({"places": [zone]}));
+    assert_eq!(input.judged.len(), 1, "the part has no limit of its own");
+    let inside = of(&input, LimitOn::Shear, Some("a rectangle"));
+    assert_eq!(inside.verdict, Kept::Within);
+    assert_eq!(inside.worst.unwrap().by, "local[A]");
+}
+
+#[test]
+fn what_has_not_been_looked_at_closely_enough_is_not_judged_and_says_why() {
+    let (_keep, folder) = folder();
+    // The made-up fine runs tell no curvature: elements that do not bend have no wrinkles.
+    let wide = json!({"wrinkle_height": "1 m", "fibre_strain": 0.5});
+    let input = with(whole(&folder), wide.clone());
+    let height = of(&input, LimitOn::WrinkleHeight, None);
+    assert_eq!(height.verdict, Kept::NotJudged);
+    assert!(
+        height
+            .notes
+            .iter()
+            .any(|n| n.contains("local[A] do not bend")),
+        "{:?}",
+        height.notes
+    );
+    assert_eq!(of(&input, LimitOn::FibreStrain, None).verdict, Kept::Within);
+    // Before anything has been compared, before there are zones, and before there is a run.
+    let mut study = whole_study(&folder);
+    study.instances.retain(|i| i.record.kind != "comparison");
+    let uncompared = with(study.input(), wide.clone());
+    let height = of(&uncompared, LimitOn::WrinkleHeight, None);
+    assert!(
+        height.notes[0].contains("no fine run has been compared"),
+        "{:?}",
+        height.notes
+    );
+    let mut empty = whole(&folder);
+    empty.instances.clear();
+    let empty = with(empty, wide);
+    assert!(empty.judged.iter().all(|j| j.verdict == Kept::NotJudged));
+    assert_eq!(empty.judged.len(), 2);
+}
+
+#[test]
+fn the_first_screen_answers_and_leads_to_the_defects() {
+    let (_keep, folder) = folder();
+    let input = with(
+        whole(&folder),
+        json!({"wrinkle_length": "60 mm", "shear": "60 deg", "source": "drawing 7"}),
+    );
+    let page = page(&input, &folder);
+    let (head, rest) = page.split_once("</header>").unwrap();
+    let answer = &head[head.find("<section id=\"answer\" class=\"bad\">").unwrap()..];
+    for text in [
+        "The part exceeds 1 of 2 limits; worst: wrinkle length 68.4 mm (at most 60 mm), AW1 on ply_2, zone A at",
+        "<td class=\"missed\">✗ beyond</td>",
+        "<td class=\"met\">✓ within</td>",
+        "<li data-defect=\"0-AW1\"><b>AW1 on ply_2, zone A at x = ",
+        "AW1, BW1 lie beside bridges",
+        "2 zones; 2 wrinkles, longest 68.4 mm; 2 bridging areas.",
+        "Nothing speaks against it.",
+        "--confirm</code> tells.",
+    ] {
+        assert!(answer.contains(text), "{text} in {answer}");
+    }
+    let limits = &rest[rest.find("<section id=\"limits\">").unwrap()..];
+    assert!(
+        limits.contains("drawing 7")
+            && limits.contains("2 fine runs in their zones; coarse elsewhere")
+    );
+    let told = summary(&input, None);
+    assert!(
+        told.starts_with("the part exceeds 1 of 2 limits; worst: wrinkle length"),
+        "{told}"
+    );
+}
+
+#[test]
+fn without_limits_nothing_is_called_good() {
+    let (_keep, folder) = folder();
+    let input = whole(&folder);
+    assert!(judge(&input).is_empty());
+    let page = page(&input, &folder);
+    assert!(
+        page.contains("<p class=\"verdict found\">No limits were given, so nothing is judged.</p>")
+    );
+    assert!(page.contains("What was found?") && !page.contains("id=\"limits\""));
+    assert!(!page.contains("class=\"verdict good\""));
+    assert!(!summary(&input, None).contains("limit"));
+}
+
+#[test]
+fn of_a_study_every_point_is_judged_by_itself() {
+    let (_keep, folder) = folder();
+    let input = with(family::sweep(&folder, 45), json!({"shear": "1 deg"}));
+    let points = &input.family.as_ref().unwrap().points;
+    assert!(
+        points
+            .iter()
+            .all(|p| input.judged.iter().any(|j| j.of.starts_with(&p.name)))
+    );
+    let page = page(&input, &folder);
+    assert!(
+        page.contains("Over all points, the part exceeds")
+            || page.contains("Over all points, the part is not judged")
+    );
+}
