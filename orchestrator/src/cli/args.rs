@@ -1,10 +1,12 @@
 //! The words of the command line.
 
 mod cluster;
+mod export;
 mod new;
 mod trust;
 
 pub use cluster::{ClusterArgs, PilotArgs};
+pub use export::{ExportArgs, ExportFormat, ExportUnit};
 pub use new::{NewArgs, NewKind};
 pub use trust::TrustArgs;
 
@@ -87,6 +89,9 @@ pub enum Command {
         after_help = "Examples:\n  plyflow extract workflow.yaml bending --list\n  plyflow extract workflow.yaml bending --to materials\n  plyflow extract workflow.yaml 'local[A]' --to out --force"
     )]
     Extract(ExtractArgs),
+    /// Write formed plies as files of other programs: VTK, CSV, Abaqus, CalculiX, Nastran, DXF
+    #[command(after_help = export::EXPORT_EXAMPLES)]
+    Export(ExportArgs),
     /// Print the JSON Schema of a file format, for editors, or its keys in words
     #[command(
         after_help = "Examples:\n  plyflow schema scene --format text               # all keys of a scene, with types, bounds and defaults\n  plyflow schema workflow > workflow.schema.json\n  # first line of a workflow, read by editors:\n  # yaml-language-server: $schema=./workflow.schema.json"
