@@ -1,6 +1,6 @@
 //! Tables: the points of each body, and its cells. Heads and numbers are those of the step `export-csv`: as many digits as give a number back.
 
-use crate::File;
+use crate::file::File;
 use crate::part::{Body, Field, Part};
 use crate::vec3::{Vec3, add_scaled, scaled};
 use plyflow_artifact::On;
@@ -10,10 +10,10 @@ use std::fmt::Write as _;
 pub fn write(part: &Part, stem: &str, files: &mut Vec<File>) {
     for body in &part.bodies {
         for (what, text) in [("points", points(part, body)), ("cells", cells(part, body))] {
-            files.push(File {
-                name: format!("{stem}-{}-{what}.csv", body.name),
-                content: text.into_bytes(),
-            });
+            files.push(File::of_text(
+                format!("{stem}-{}-{what}.csv", body.name),
+                text,
+            ));
         }
     }
 }

@@ -7,11 +7,11 @@
 //!
 //! Materials are not written: what the fabric becomes with its resin is not known here.
 
-use crate::File;
 use crate::fibres::Sheared;
+use crate::file::File;
 use crate::part::{Part, Ply};
 use crate::request::{Format, Request};
-use crate::shells::{Shells, label, shells};
+use crate::shells::{ELEMENT, Shells, label, shells};
 use crate::vec3::{Vec3, add_scaled, cross, scaled};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -54,10 +54,7 @@ pub fn write(part: &Part, request: &Request, files: &mut Vec<File>, told: &mut V
             materials.join(", ")
         ));
     }
-    files.push(File {
-        name: format!("{}.inp", request.stem),
-        content: text.into_bytes(),
-    });
+    files.push(File::of_text(format!("{}.inp", request.stem), text));
 }
 
 /// Of a ply whose fibres and thickness are known.
@@ -228,23 +225,20 @@ fn distributions(text: &mut String, shells: &Shells<'_>, laminate: &Laminate<'_>
     }
 }
 
-/// CalculiX: a section and two orientations for each element.
+/// CalculiX: a section and two orientations for each element, under names that no body has.
 fn sections(text: &mut String, shells: &Shells<'_>, laminate: &Laminate<'_>) {
-    let (name, material) = (&shells.label, &laminate.material);
+    let material = &laminate.material;
     for (element, cell) in shells.elements() {
+        let own = format!("{ELEMENT}{element}");
         for family in 0..2 {
             let axes = axes(laminate.shape(cell), family);
-            let _ = writeln!(
-                text,
-                "*Orientation, name={name}_{element}_{}\n{axes}",
-                family + 1
-            );
+            let _ = writeln!(text, "*Orientation, name={own}_{}\n{axes}", family + 1);
         }
         let half = number(0.5 * laminate.thickness[cell]);
         let _ = writeln!(
             text,
-            "*Elset, elset={name}_{element}\n{element}\n*Shell Section, elset={name}_{element}, composite\n\
-             {half}, , {material}, {name}_{element}_1\n{half}, , {material}, {name}_{element}_2"
+            "*Elset, elset={own}\n{element}\n*Shell Section, elset={own}, composite\n\
+             {half}, 3, {material}, {own}_1\n{half}, 3, {material}, {own}_2"
         );
     }
 }

@@ -12,6 +12,7 @@ mod deck;
 mod dxf;
 mod error;
 mod fibres;
+mod file;
 mod nastran;
 mod net;
 mod part;
@@ -22,19 +23,12 @@ mod vtu;
 
 pub use error::ExportError;
 pub use fibres::{Sheared, sheared};
+pub use file::File;
 pub use request::{Format, Frames, LengthUnit, Request};
 
 use part::Part;
 use plyflow_artifact::Artifact;
-
-/// A file, ready to be written.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct File {
-    /// Its name in the folder that the user gave.
-    pub name: String,
-    /// What is in it.
-    pub content: Vec<u8>,
-}
+use std::collections::BTreeSet;
 
 /// What an export gives.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -79,6 +73,8 @@ pub fn export(artifact: &Artifact, request: &Request) -> Result<Exported, Export
     if frames.len() > 1 {
         files.push(vtu::collection(&request.stem, &series));
     }
-    told.dedup();
+    // Each frame says the same of the same body.
+    let mut seen = BTreeSet::new();
+    told.retain(|t| seen.insert(t.clone()));
     Ok(Exported { files, told })
 }

@@ -6,9 +6,9 @@
 //!
 //! Materials are not written. Numbers stand in fields of 16 characters.
 
-use crate::File;
 use crate::fibres::Sheared;
-use crate::part::Part;
+use crate::file::File;
+use crate::part::{Part, Ply};
 use crate::shells::{Shells, shells};
 use crate::vec3::{add_scaled, cross, dot, sub};
 use plyflow_fixed::FixedBits;
@@ -26,81 +26,116 @@ pub fn write(part: &Part, stem: &str, files: &mut Vec<File>, told: &mut Vec<Stri
     let mut materials: Vec<&str> = Vec::new();
     for (k, shells) in all.iter().enumerate() {
         grid(&mut text, shells);
-        let own = 10 * (k + 1);
+        let property = 10 * (k + 1);
         let ply = shells
             .body
             .ply
             .as_ref()
             .filter(|p| p.sheet.fibres().is_some());
-        let Some((ply, thickness)) = ply.and_then(|p| Some((p, p.thickness.as_ref()?))) else {
-            told.push(format!(
-                "{}: only its mesh is written, with the property {own} that your model has to have: {}",
-                shells.body.name,
-                if shells.body.ply.is_some() { "its fibres or its thickness are not known" } else { "it is no ply" }
-            ));
-            let _ = writeln!(text, "$ {}: property {own} of your model", shells.label);
-            for (_, cell) in shells.elements() {
-                shell(&mut text, shells, cell, element, own, None);
-                element += 1;
-            }
-            continue;
-        };
-        let name = ply.sheet.material.as_deref().unwrap_or("fabric");
-        let material = materials
-            .iter()
-            .position(|m| *m == name)
-            .unwrap_or_else(|| {
+        if let Some((ply, thickness)) = ply.and_then(|p| Some((p, p.thickness.as_ref()?))) {
+            let name = ply.sheet.material.as_deref().unwrap_or("fabric");
+            let known = materials.iter().position(|m| *m == name);
+            let material = 1 + known.unwrap_or_else(|| {
                 materials.push(name);
                 materials.len() - 1
-            })
-            + 1;
-        for family in 0..2 {
-            let property = own + family + 1;
-            let _ = writeln!(
-                text,
-                "$ {}: family {} is property {property}",
-                shells.label,
-                family + 1
-            );
-            let half = card(
-                "PSHELL",
-                &[
-                    whole(property),
-                    whole(material),
-                    real(0.5 * ply.sheet.thickness * part.scale),
-                    whole(material),
-                ],
-            );
-            text += &half;
-            for (_, cell) in shells.elements() {
-                let shape = ply.sheared[cell]
-                    .as_ref()
-                    .expect("cells with a shape are listed");
-                let layer = Layer {
-                    shape,
-                    family,
-                    thickness: 0.5 * thickness[cell],
-                };
-                shell(&mut text, shells, cell, element, property, Some(&layer));
-                element += 1;
+            });
+            let half = 0.5 * ply.sheet.thickness * part.scale;
+            for family in 0..2 {
+                let property = property + family + 1;
+                let _ = writeln!(
+                    text,
+                    "$ {}: family {} is property {property}",
+                    shells.label,
+                    family + 1
+                );
+                text += &card(
+                    "PSHELL",
+                    &[
+                        whole(property),
+                        whole(material),
+                        real(half),
+                        whole(material),
+                    ],
+                );
+                layer(
+                    &mut text,
+                    shells,
+                    ply,
+                    (family, property),
+                    thickness,
+                    &mut element,
+                );
             }
+        } else {
+            bare(&mut text, shells, property, &mut element, told);
         }
     }
-    if !materials.is_empty() {
-        let list: Vec<String> = materials
-            .iter()
-            .enumerate()
-            .map(|(k, m)| format!("{} ({m})", k + 1))
-            .collect();
-        told.push(format!(
-            "give the materials (MAT8) {} in your model, 1 along the fibres: what the fabric becomes with its resin is not in the artifact",
-            list.join(", ")
-        ));
+    tell_materials(&materials, told);
+    files.push(File::of_text(format!("{stem}.bdf"), text));
+}
+
+/// Says which materials the model has to have.
+fn tell_materials(materials: &[&str], told: &mut Vec<String>) {
+    if materials.is_empty() {
+        return;
     }
-    files.push(File {
-        name: format!("{stem}.bdf"),
-        content: text.into_bytes(),
-    });
+    let named = materials.iter().enumerate();
+    let list: Vec<String> = named.map(|(k, m)| format!("{} ({m})", k + 1)).collect();
+    told.push(format!(
+        "give the materials (MAT8) {} in your model, 1 along the fibres: what the fabric becomes with its resin is not in the artifact",
+        list.join(", ")
+    ));
+}
+
+/// Elements of one family of a ply, from a number on.
+fn layer(
+    text: &mut String,
+    shells: &Shells<'_>,
+    ply: &Ply,
+    (family, property): (usize, usize),
+    thickness: &[f64],
+    element: &mut usize,
+) {
+    for (_, cell) in shells.elements() {
+        let shape = ply.sheared[cell]
+            .as_ref()
+            .expect("cells with a shape are listed");
+        let thickness = 0.5 * thickness[cell];
+        let layer = Layer {
+            shape,
+            family,
+            thickness,
+        };
+        shell(text, shells, cell, *element, property, Some(&layer));
+        *element += 1;
+    }
+}
+
+/// Elements of a body without layers, with a property that the model has to have.
+fn bare(
+    text: &mut String,
+    shells: &Shells<'_>,
+    property: usize,
+    element: &mut usize,
+    told: &mut Vec<String>,
+) {
+    told.push(format!(
+        "{}: only its mesh is written, with the property {property} that your model has to have: {}",
+        shells.body.name,
+        match shells.body.ply {
+            Some(_) => "its fibres or its thickness are not known",
+            None => "it is no ply",
+        }
+    ));
+    let _ = writeln!(
+        text,
+        "$ {}: property {property} of your model",
+        shells.label
+    );
+    for (_, cell) in shells.elements() {
+        shell(text, shells, cell, *element, property, None);
+        *element += 1;
+    }
 }
 
 /// A family of fibres in a cell.

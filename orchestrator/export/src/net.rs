@@ -30,6 +30,7 @@ struct Crossing {
 
 /// Lines of a family with the direction `angle` (rad, from x) in the flat ply, through the cells that have a shape. They are multiples of `distance`
 /// (in the unit of the body's points) from x = y = 0, in the order of these, and from their beginning on. A line that cells interrupt is several.
+/// A line that is the ply's edge itself is one where the ply lies to its right.
 ///
 /// # Errors
 /// When there would be too many.
@@ -40,7 +41,16 @@ pub fn fibres(
     per_metre: f64,
 ) -> Result<Vec<Fibre>, ExportError> {
     let (sin, cos) = angle.fixed_sin_cos();
-    let across = |p: Vec3| (cos * p[1] - sin * p[0]) / distance;
+    // Points that are on a line but for rounding are on it: where fibres run along the mesh, all of a row are.
+    let across = |p: Vec3| {
+        let height = (cos * p[1] - sin * p[0]) / distance;
+        let whole = height.round();
+        if (height - whole).abs() < 1e-9 {
+            whole
+        } else {
+            height
+        }
+    };
     let heights: Vec<f64> = body.flat.iter().map(|p| across(*p)).collect();
     let span = |cell: usize| {
         let of = body.corners(cell).iter().map(|i| heights[*i as usize]);
@@ -122,27 +132,46 @@ fn crossings(
     found
 }
 
-/// Pieces of one line, joined where they share a side.
-fn joined(mut pieces: Vec<[Crossing; 2]>) -> Vec<Fibre> {
-    pieces.sort_by(|a, b| {
-        a[0].along
-            .total_cmp(&b[0].along)
-            .then(a[1].along.total_cmp(&b[1].along))
-    });
-    let mut lines: Vec<Fibre> = Vec::new();
-    let mut last: Option<[u32; 2]> = None;
-    for [from, to] in pieces {
-        if last == Some(from.side) {
-            let line = lines.last_mut().expect("a piece came before");
-            line.flat.push(to.flat);
-            line.formed.push(to.formed);
-        } else {
+/// Pieces of one line, joined where they share a side: from each end that lies foremost, as far as they go.
+fn joined(pieces: Vec<[Crossing; 2]>) -> Vec<Fibre> {
+    let mut at: BTreeMap<[u32; 2], Vec<usize>> = BTreeMap::new();
+    for (k, piece) in pieces.iter().enumerate() {
+        for crossing in piece {
+            at.entry(crossing.side).or_default().push(k);
+        }
+    }
+    let mut ends: Vec<(usize, Crossing)> = Vec::new();
+    for (k, piece) in pieces.iter().enumerate() {
+        ends.extend(
+            piece
+                .iter()
+                .filter(|c| at[&c.side].len() == 1)
+                .map(|c| (k, *c)),
+        );
+    }
+    ends.sort_by(|a, b| a.1.along.total_cmp(&b.1.along));
+    let mut used = vec![false; pieces.len()];
+    let mut lines = Vec::new();
+    for (first, from) in ends {
+        let (mut line, mut side) = (vec![from], from.side);
+        let mut next = Some(first).filter(|k| !used[*k]);
+        while let Some(k) = next {
+            used[k] = true;
+            let [a, b] = pieces[k];
+            let to = if a.side == side { b } else { a };
+            // Where the line meets a corner, a piece may have no length.
+            if line.last().is_some_and(|l| l.flat != to.flat) {
+                line.push(to);
+            }
+            side = to.side;
+            next = at[&side].iter().copied().find(|k| !used[*k]);
+        }
+        if line.len() > 1 {
             lines.push(Fibre {
-                flat: vec![from.flat, to.flat],
-                formed: vec![from.formed, to.formed],
+                flat: line.iter().map(|c| c.flat).collect(),
+                formed: line.iter().map(|c| c.formed).collect(),
             });
         }
-        last = Some(to.side);
     }
     lines
 }
@@ -190,7 +219,8 @@ mod tests {
             }
         }
         let back = fibres(&body(&[]), PI, 0.8, 1.0).unwrap();
-        assert_eq!(back.len(), 2);
+        // Here the edge at 0 has the ply on its right.
+        assert_eq!(back.len(), 3);
         assert!(
             back[0].flat[0][0] > back[0].flat[3][0],
             "from its beginning on"
@@ -207,6 +237,30 @@ mod tests {
             for p in [line.flat[0], line.flat[line.flat.len() - 1]] {
                 let on = |x: f64, end: f64| x.abs() < 1e-12 || (x - end).abs() < 1e-12;
                 assert!(on(p[0], 3.0) || on(p[1], 2.0), "{p:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn lines_along_the_mesh_and_through_its_corners_are_whole() {
+        for (angle, distance, count) in [
+            (0.0, 1.0, 2),
+            (PI / 2.0, 1.0, 3),
+            (PI, 1.0, 2),
+            (FRAC_PI_4, 0.5f64.sqrt(), 4),
+        ] {
+            let mut body = body(&[]);
+            // A grid about x = y = 0 has heights that differ in their last bits.
+            body.flat
+                .iter_mut()
+                .for_each(|p| *p = [p[0] - 1.5 + 0.5, p[1] - 1.0, 0.0]);
+            let lines = fibres(&body, angle, distance, 1.0).unwrap();
+            assert_eq!(lines.len(), count, "{angle}: {lines:?}");
+            for line in &lines {
+                let ordered = line.flat.windows(2).all(|w| {
+                    (w[1][0] - w[0][0]) * angle.cos() + (w[1][1] - w[0][1]) * angle.sin() > 0.1
+                });
+                assert!(ordered, "{angle}: {line:?}");
             }
         }
     }

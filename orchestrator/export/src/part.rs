@@ -2,7 +2,7 @@
 
 use crate::error::ExportError;
 use crate::fibres::{Sheared, sheared};
-use crate::request::{Format, Request};
+use crate::request::{Format, LengthUnit, Request};
 use crate::vec3::Vec3;
 use plyflow_artifact::{Artifact, BodyInfo, On};
 use plyflow_model::artifact::{Forming, Sheet};
@@ -121,20 +121,15 @@ impl Part {
         }
         let plies = plies(artifact)?;
         let names = chosen(artifact, request, &plies)?;
-        let scale = request.unit.per_metre();
         let mut bodies = Vec::new();
         for name in names {
             let ply = plies.iter().position(|s| s.name == name);
             let ply = ply.map(|at| (at + 1, &plies[at]));
-            bodies.push(read_body(
-                artifact,
-                name,
-                frame,
-                scale,
-                request.unit.symbol(),
-                ply,
-                told,
-            )?);
+            let mut body = read_body(artifact, name, frame, ply, told)?;
+            if request.unit != LengthUnit::Metre {
+                rescale(&mut body, request.unit);
+            }
+            bodies.push(body);
         }
         let time = frame.and_then(|k| artifact.times().get(k as usize).copied());
         Ok(Self {
@@ -142,7 +137,7 @@ impl Part {
             bodies,
             time,
             unit: request.unit.symbol(),
-            scale,
+            scale: request.unit.per_metre(),
         })
     }
 }
@@ -210,26 +205,15 @@ fn read_fields(
     artifact: &Artifact,
     info: &BodyInfo,
     frame: u64,
-    scale: f64,
-    unit: &str,
 ) -> Result<Vec<Field>, ExportError> {
     let mut fields = Vec::new();
     for f in &info.fields {
-        let mut values = artifact.frame_field(&info.name, frame, f.on, &f.name)?;
-        let is_length = f.unit == "m";
-        if is_length && scale != 1.0 {
-            values.iter_mut().for_each(|v| *v *= scale);
-        }
         fields.push(Field {
             name: f.name.clone(),
             on: f.on,
             components: f.components as usize,
-            unit: if is_length {
-                unit.to_owned()
-            } else {
-                f.unit.clone()
-            },
-            values,
+            unit: f.unit.clone(),
+            values: artifact.frame_field(&info.name, frame, f.on, &f.name)?,
             stored: true,
         });
     }
@@ -240,20 +224,18 @@ fn read_body(
     artifact: &Artifact,
     name: &str,
     frame: Option<u64>,
-    scale: f64,
-    unit: &str,
     ply: Option<(usize, &Sheet)>,
     told: &mut Vec<String>,
 ) -> Result<Body, ExportError> {
     let info = artifact.body(name)?;
-    let (mut flat, cells) = artifact.mesh(name)?;
-    let mut points = match frame {
+    let (flat, cells) = artifact.mesh(name)?;
+    let points = match frame {
         Some(frame) => artifact.frame_points(name, frame)?,
         None => flat.clone(),
     };
     let k = info.nodes_per_cell as usize;
     let fields = match frame {
-        Some(frame) => read_fields(artifact, info, frame, scale, unit)?,
+        Some(frame) => read_fields(artifact, info, frame)?,
         None => Vec::new(),
     };
     let draped = fields
@@ -273,20 +255,30 @@ fn read_body(
         fields,
         ply: None,
     };
-    if scale != 1.0 {
-        for p in flat.iter_mut().chain(&mut points) {
-            *p = p.map(|x| x * scale);
-        }
-    }
     (body.flat, body.points) = (flat, points);
     if info.moving {
         let values = body.flat.as_flattened().to_vec();
-        add(&mut body, "undeformed", On::Points, 3, unit, values, told);
+        add(&mut body, "undeformed", On::Points, 3, "m", values, told);
     }
     if let Some((number, sheet)) = ply {
-        derive(&mut body, number, sheet, scale, unit, told);
+        derive(&mut body, number, sheet, told);
     }
     Ok(body)
+}
+
+/// Gives lengths in another unit, after all has been computed: what is no length keeps its bits.
+fn rescale(body: &mut Body, unit: LengthUnit) {
+    let scale = unit.per_metre();
+    for p in body.flat.iter_mut().chain(&mut body.points) {
+        *p = p.map(|x| x * scale);
+    }
+    for field in body.fields.iter_mut().filter(|f| f.unit == "m") {
+        unit.symbol().clone_into(&mut field.unit);
+        field.values.iter_mut().for_each(|v| *v *= scale);
+    }
+    if let Some(thickness) = body.ply.as_mut().and_then(|p| p.thickness.as_mut()) {
+        thickness.iter_mut().for_each(|v| *v *= scale);
+    }
 }
 
 /// Adds a field that is computed here, unless the artifact has one of that name.
@@ -317,23 +309,13 @@ fn add(
 }
 
 /// The fields that follow from the shape of a ply. What the artifact does not tell is said, and no field of it is made.
-fn derive(
-    body: &mut Body,
-    number: usize,
-    sheet: &Sheet,
-    scale: f64,
-    unit: &str,
-    told: &mut Vec<String>,
-) {
-    let name = &sheet.name;
+fn derive(body: &mut Body, number: usize, sheet: &Sheet, told: &mut Vec<String>) {
     // A ply without fibres has an area all the same.
     let fibres = sheet.fibres().unwrap_or([0.0, std::f64::consts::FRAC_PI_2]);
     let of = |cell: usize| {
         let at = |points: &[Vec3]| -> Vec<Vec3> {
-            body.corners(cell)
-                .iter()
-                .map(|i| points[*i as usize])
-                .collect()
+            let corners = body.corners(cell).iter();
+            corners.map(|i| points[*i as usize]).collect()
         };
         let shaped = body.shaped[cell];
         shaped
@@ -342,13 +324,10 @@ fn derive(
     };
     let shapes: Vec<Option<Sheared>> = (0..body.count()).map(of).collect();
     let over = |value: f64| -> Vec<f64> {
-        shapes
-            .iter()
-            .map(|s| s.map_or(f64::NAN, |s| value / s.area_ratio))
-            .collect()
+        let of = |s: &Option<Sheared>| s.map_or(f64::NAN, |s| value / s.area_ratio);
+        shapes.iter().map(of).collect()
     };
-    let thickness = (sheet.thickness > 0.0).then(|| over(scale * sheet.thickness));
-    let areal_mass = sheet.areal_mass.map(over);
+    let thickness = (sheet.thickness > 0.0).then(|| over(sheet.thickness));
     let cells = On::Cells;
     add(
         body,
@@ -359,34 +338,24 @@ fn derive(
         vec![number as f64; shapes.len()],
         told,
     );
-    if sheet.fibres().is_some() {
-        for family in 0..2 {
-            let of = |s: &Option<Sheared>| s.map_or([f64::NAN; 3], |s| s.directions[family]);
-            let values = shapes.iter().flat_map(of).collect();
-            let field = format!("fibre_direction_{}", family + 1);
-            add(body, &field, cells, 3, "1", values, told);
-        }
-        let angles = shapes
-            .iter()
-            .map(|s| s.map_or(f64::NAN, |s| s.angle))
-            .collect();
-        add(body, "fibre_angle", cells, 1, "rad", angles, told);
-    } else {
-        told.push(format!(
-            "{name}: the artifact does not tell its fibre directions, so none are written"
-        ));
+    let mut unknown = Vec::new();
+    match sheet.fibres() {
+        Some(_) => add_fibres(body, &shapes, told),
+        None => unknown.push("its fibre directions"),
     }
     match &thickness {
-        Some(values) => add(body, "thickness", cells, 1, unit, values.clone(), told),
-        None => told.push(format!(
-            "{name}: the artifact does not tell its thickness, so none is written"
-        )),
+        Some(values) => add(body, "thickness", cells, 1, "m", values.clone(), told),
+        None => unknown.push("its thickness"),
     }
-    match areal_mass {
+    match sheet.areal_mass.map(over) {
         Some(values) => add(body, "areal_mass", cells, 1, "kg/m2", values, told),
-        None => told.push(format!(
-            "{name}: the artifact does not tell its areal mass, so none is written"
-        )),
+        None => unknown.push("its areal mass"),
+    }
+    let name = &sheet.name;
+    for what in unknown {
+        told.push(format!(
+            "{name}: the artifact does not tell {what}, so nothing is written of that"
+        ));
     }
     body.ply = Some(Ply {
         number,
@@ -394,6 +363,25 @@ fn derive(
         sheared: shapes,
         thickness,
     });
+}
+
+fn add_fibres(body: &mut Body, shapes: &[Option<Sheared>], told: &mut Vec<String>) {
+    for family in 0..2 {
+        let of = |s: &Option<Sheared>| s.map_or([f64::NAN; 3], |s| s.directions[family]);
+        let values = shapes.iter().flat_map(of).collect();
+        let field = format!("fibre_direction_{}", family + 1);
+        add(body, &field, On::Cells, 3, "1", values, told);
+    }
+    let angle = |s: &Option<Sheared>| s.map_or(f64::NAN, |s| s.angle);
+    add(
+        body,
+        "fibre_angle",
+        On::Cells,
+        1,
+        "rad",
+        shapes.iter().map(angle).collect(),
+        told,
+    );
 }
 
 /// Where the numbers come from, in lines of plain text.

@@ -3,6 +3,9 @@
 use crate::part::{Body, Part};
 use std::collections::BTreeSet;
 
+/// With what the names of single elements begin, and that of no body.
+pub const ELEMENT: &str = "CELL_";
+
 /// A body as shells.
 pub struct Shells<'a> {
     /// The body.
@@ -80,7 +83,7 @@ pub fn label(name: &str) -> String {
         }
     };
     let name: String = name.chars().map(fit).take(60).collect();
-    match name.starts_with(|c: char| c.is_ascii_uppercase()) {
+    match name.starts_with(|c: char| c.is_ascii_uppercase()) && !name.starts_with(ELEMENT) {
         true => name,
         false => format!("N{name}"),
     }
@@ -104,9 +107,12 @@ mod tests {
     #[test]
     fn names_become_labels_that_stay_apart() {
         let mut taken = BTreeSet::new();
-        let labels: Vec<String> = ["ply-1", "ply.1", "PLY_1", "_a", "ä"]
+        let labels: Vec<String> = ["ply-1", "ply.1", "PLY_1", "_a", "ä", "cell_7"]
             .map(|n| own(&mut taken, label(n)))
             .into();
-        assert_eq!(labels, ["PLY_1", "PLY_1_2", "PLY_1_3", "N_A", "N_"]);
+        assert_eq!(
+            labels,
+            ["PLY_1", "PLY_1_2", "PLY_1_3", "N_A", "N_", "NCELL_7"]
+        );
     }
 }

@@ -4,7 +4,7 @@
 //! so do meshio and programs that know VTK's format. Stored fields keep their single precision. The unit of an array stands in VTK's own
 //! key for it, `UNITS_LABEL`.
 
-use crate::File;
+use crate::file::File;
 use crate::part::{Body, Field, Part};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -21,8 +21,7 @@ pub fn write(part: &Part, stem: &str, files: &mut Vec<File>) -> String {
             "    <DataSet index=\"{k}\" name=\"{}\" file=\"{name}\"/>",
             body.name
         );
-        let content = unstructured(part, body).into_bytes();
-        files.push(File { name, content });
+        files.push(File::of_text(name, unstructured(part, body)));
     }
     if let [_] = part.bodies[..] {
         return files[files.len() - 1].name.clone();
@@ -33,11 +32,7 @@ pub fn write(part: &Part, stem: &str, files: &mut Vec<File>) -> String {
         &format!("  <vtkMultiBlockDataSet>\n{blocks}  </vtkMultiBlockDataSet>\n"),
     );
     let name = format!("{stem}.vtm");
-    let content = text.into_bytes();
-    files.push(File {
-        name: name.clone(),
-        content,
-    });
+    files.push(File::of_text(name.clone(), text));
     name
 }
 
@@ -55,10 +50,7 @@ pub fn collection(stem: &str, frames: &[(f64, String)]) -> File {
         &[],
         &format!("  <Collection>\n{sets}  </Collection>\n"),
     );
-    File {
-        name: format!("{stem}.pvd"),
-        content: text.into_bytes(),
-    }
+    File::of_text(format!("{stem}.pvd"), text)
 }
 
 fn xml(kind: &str, origin: &[String], inner: &str) -> String {

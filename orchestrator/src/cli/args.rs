@@ -3,11 +3,13 @@
 mod cluster;
 mod export;
 mod new;
+mod places;
 mod trust;
 
 pub use cluster::{ClusterArgs, PilotArgs};
 pub use export::{ExportArgs, ExportFormat, ExportUnit};
 pub use new::{NewArgs, NewKind};
+pub use places::Places;
 pub use trust::TrustArgs;
 
 use crate::exit;
@@ -199,26 +201,6 @@ pub struct Workflow {
         default_missing_value = "all"
     )]
     pub confirm: Option<String>,
-}
-
-/// Where things are.
-#[derive(Debug, Args, Default)]
-pub struct Places {
-    /// Folder for artifacts and journals [default: .plyflow beside the workflow]
-    #[arg(long, value_name = "DIR")]
-    pub store: Option<Utf8PathBuf>,
-    /// Look for plugins here first, and trust what lies there; may be repeated
-    #[arg(long, value_name = "DIR")]
-    pub plugins: Vec<Utf8PathBuf>,
-    /// Load libraries that a workflow brings along: all, or the one with this path or BLAKE3; may be repeated
-    #[arg(
-        long,
-        value_name = "LIBRARY",
-        num_args = 0..=1,
-        require_equals = true,
-        default_missing_value = ""
-    )]
-    pub trust: Vec<String>,
 }
 
 /// `run`

@@ -5,7 +5,7 @@ use super::deliver::{Ready, write_all};
 use super::inspect::{artifact_of, record_of};
 use super::open::open;
 use crate::exit;
-use crate::said::{Done, Stop, print};
+use crate::said::{Done, Stop, print, warn};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_artifact::Artifact;
 use plyflow_export::{ExportError, Format, Frames, LengthUnit, Request};
@@ -122,7 +122,11 @@ fn located(args: &ExportArgs) -> Result<(Utf8PathBuf, Option<String>), Stop> {
     let is_artifact = starts_as_hdf5(file);
     let Some(step) = &args.step else {
         if is_artifact {
-            record_of(file)?;
+            if record_of(file)?.is_none() {
+                warn(&format!(
+                    "plyflow: no record lies beside {file}, so it cannot be told whether it is as it was written\n"
+                ));
+            }
             return Ok((file.clone(), None));
         }
         let text = match file.is_file() {

@@ -1,6 +1,6 @@
 //! The words of `export`.
 
-use super::Places;
+use super::places::Places;
 use camino::Utf8PathBuf;
 use clap::{Args, ValueEnum};
 
@@ -30,7 +30,7 @@ pub struct ExportArgs {
     #[arg(long, value_name = "DIR")]
     pub to: Option<Utf8PathBuf>,
     /// Which frame, from 0, or `all` (vtu) [default: the last one]
-    #[arg(long, value_name = "NUMBER|all")]
+    #[arg(long, value_name = "NUMBER|all", allow_hyphen_values = true)]
     pub frame: Option<String>,
     /// Only this body; may be repeated [default: all bodies for vtu, all plies for the others]
     #[arg(long, value_name = "NAME")]
