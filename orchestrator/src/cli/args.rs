@@ -91,7 +91,7 @@ pub enum Command {
         after_help = "Examples:\n  plyflow extract workflow.yaml bending --list\n  plyflow extract workflow.yaml bending --to materials\n  plyflow extract workflow.yaml 'local[A]' --to out --force"
     )]
     Extract(ExtractArgs),
-    /// Write formed plies as files of other programs: VTK, CSV, Abaqus, CalculiX, Nastran, DXF
+    /// Write formed plies for other programs: VTK, CSV, Abaqus, CalculiX, Nastran, DXF
     #[command(after_help = export::EXPORT_EXAMPLES)]
     Export(ExportArgs),
     /// Print the JSON Schema of a file format, for editors, or its keys in words

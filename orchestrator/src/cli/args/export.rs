@@ -6,14 +6,15 @@ use clap::{Args, ValueEnum};
 
 pub(super) const EXPORT_EXAMPLES: &str = "\
 Examples:
-  plyflow export workflow.yaml coarse --format vtu --to out              # all bodies with all fields, for ParaView and others
+  plyflow export workflow.yaml coarse --format vtu --to out           # all bodies, all fields
   plyflow export workflow.yaml 'local[A]' --format vtu,csv --to out
   plyflow export workflow.yaml draped --format abaqus --unit mm --to out
   plyflow export workflow.yaml draped --format dxf --unit mm --net '10 mm' --to out
-  plyflow export result.vtkhdf --format vtu --frame all --to out          # an artifact by itself, as a series in time
+  plyflow export result.vtkhdf --format vtu --frame all --to out      # an artifact, as a series
 
-Besides the fields of the artifact, files of plies have the fibre directions of both families, the angle between them, the thickness at constant
-volume, the areal mass and the number of the ply. Lengths are in metres unless --unit says otherwise; all else is in SI units.";
+Besides the fields of the artifact, files of plies have the fibre directions of both families, the
+angle between them, the thickness at constant volume, the areal mass and the number of the ply.
+Lengths are in metres unless --unit says otherwise; all else is in SI units.";
 
 /// `export`
 #[derive(Debug, Args)]
