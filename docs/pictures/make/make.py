@@ -6,6 +6,7 @@ import time
 import browser
 import coupons
 import diagrams
+import drawings
 import law
 import others
 import runs
@@ -18,8 +19,8 @@ PICTURES = {
     "kinematic": spar.kinematic, "bias-extension": coupons.bias_extension, "cantilever": coupons.cantilever, "buckling": coupons.buckling,
     "hemisphere": coupons.hemisphere, "speed-error": diagrams.speed_error, "bag-layers": diagrams.bag_layers,
     "workflow-graph": diagrams.workflow_graph, "floors": diagrams.floors, "law-in-python": law.law_in_python,
-    "files-of-others": others.files_of_others, "study": browser.study, "report": browser.report, "report-answer": browser.report_answer,
-    "report-limits": browser.report_limits,
+    "files-of-others": others.files_of_others, "export": drawings.export, "study": browser.study, "report": browser.report,
+    "report-answer": browser.report_answer, "report-limits": browser.report_limits,
 }
 # Largest files, in bytes.
 LARGEST = {".png": 250_000, ".svg": 150_000}

@@ -1,11 +1,15 @@
 //! The words of the command line.
 
 mod cluster;
+mod export;
 mod new;
+mod places;
 mod trust;
 
 pub use cluster::{ClusterArgs, PilotArgs};
+pub use export::{ExportArgs, ExportFormat, ExportUnit};
 pub use new::{NewArgs, NewKind};
+pub use places::Places;
 pub use trust::TrustArgs;
 
 use crate::exit;
@@ -87,6 +91,9 @@ pub enum Command {
         after_help = "Examples:\n  plyflow extract workflow.yaml bending --list\n  plyflow extract workflow.yaml bending --to materials\n  plyflow extract workflow.yaml 'local[A]' --to out --force"
     )]
     Extract(ExtractArgs),
+    /// Write formed plies for other programs: VTK, CSV, Abaqus, CalculiX, Nastran, DXF
+    #[command(after_help = export::EXPORT_EXAMPLES)]
+    Export(ExportArgs),
     /// Print the JSON Schema of a file format, for editors, or its keys in words
     #[command(
         after_help = "Examples:\n  plyflow schema scene --format text               # all keys of a scene, with types, bounds and defaults\n  plyflow schema workflow > workflow.schema.json\n  # first line of a workflow, read by editors:\n  # yaml-language-server: $schema=./workflow.schema.json"
@@ -194,26 +201,6 @@ pub struct Workflow {
         default_missing_value = "all"
     )]
     pub confirm: Option<String>,
-}
-
-/// Where things are.
-#[derive(Debug, Args, Default)]
-pub struct Places {
-    /// Folder for artifacts and journals [default: .plyflow beside the workflow]
-    #[arg(long, value_name = "DIR")]
-    pub store: Option<Utf8PathBuf>,
-    /// Look for plugins here first, and trust what lies there; may be repeated
-    #[arg(long, value_name = "DIR")]
-    pub plugins: Vec<Utf8PathBuf>,
-    /// Load libraries that a workflow brings along: all, or the one with this path or BLAKE3; may be repeated
-    #[arg(
-        long,
-        value_name = "LIBRARY",
-        num_args = 0..=1,
-        require_equals = true,
-        default_missing_value = ""
-    )]
-    pub trust: Vec<String>,
 }
 
 /// `run`

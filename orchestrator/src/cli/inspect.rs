@@ -52,7 +52,7 @@ pub fn inspect(args: &InspectArgs) -> Done {
 ///
 /// # Errors
 /// [`exit::DAMAGED`] when the two are not what was written.
-fn record_of(path: &Utf8Path) -> Result<Option<Record>, Stop> {
+pub fn record_of(path: &Utf8Path) -> Result<Option<Record>, Stop> {
     let found = record_beside(path).and_then(|record| {
         if let Some(record) = &record {
             check_artifact(path, record)?;

@@ -5,9 +5,11 @@ mod check_plugin;
 mod clean;
 mod cluster;
 mod confirm;
+mod deliver;
 mod demo;
 mod diff;
 mod explain;
+mod export;
 mod extract;
 mod found;
 mod front;
@@ -110,6 +112,7 @@ fn dispatch(command: Command) -> Done {
         Command::CheckPlugin(a) => check_plugin::check_plugin(&a),
         Command::Inspect(a) => inspect::inspect(&a),
         Command::Extract(a) => extract::extract(&a),
+        Command::Export(a) => export::export(&a),
         Command::Schema(a) => plugins::schema(&a),
         Command::Verify(a) => verify::verify(&a),
         Command::Diff(a) => diff::diff(&a),

@@ -162,7 +162,7 @@ fn files_of_a_step_or_an_item_are_written_where_asked_and_nothing_is_overwritten
 }
 
 #[test]
-fn what_cannot_be_extracted_says_why() {
+fn what_cannot_be_extracted_or_exported_says_why() {
     let study = study(|s| s);
     assert_eq!(study.run(&[]), well(4, 0));
     for (step, says) in [
@@ -174,6 +174,18 @@ fn what_cannot_be_extracted_says_why() {
         let (code, out, text) = told(&study.call(&["extract", step]));
         assert_eq!(code, Some(2), "{step}: {text}");
         assert!(text.contains(says) && out.is_empty(), "{step}: {text}");
+    }
+    // Nor exported.
+    for (step, says) in [
+        ("two", "there is no step 'two'; the steps are: "),
+        ("each", "'each' has several items: "),
+        ("one", "has no bodies, so there is nothing to export"),
+    ] {
+        let words = ["export", step, "--format", "vtu,csv", "--to", "out"];
+        let (code, out, text) = told(&study.call(&words));
+        assert_eq!(code, Some(2), "{step}: {text}");
+        assert!(text.contains(says) && out.is_empty(), "{step}: {text}");
+        assert!(!study.path("out").exists());
     }
 }
 

@@ -8,7 +8,7 @@ const BY_PATH: &str = "steps:\n  one: {plugin: ./libstranger.so}\n";
 const BY_NAME: &str = "plugins: [.]\nsteps:\n  one: {plugin: stranger}\n";
 
 /// Every command that reads a workflow.
-const COMMANDS: [&[&str]; 11] = [
+const COMMANDS: [&[&str]; 12] = [
     &["validate", "workflow.yaml"],
     &["validate", "workflow.yaml", "--format", "json"],
     &["plan", "workflow.yaml"],
@@ -18,6 +18,7 @@ const COMMANDS: [&[&str]; 11] = [
     &["report", "workflow.yaml"],
     &["inspect", "one", "--workflow", "workflow.yaml"],
     &["extract", "workflow.yaml", "one", "--list"],
+    &["export", "workflow.yaml", "one", "--format", "vtu"],
     &["run", "workflow.yaml"],
     &["plugins", "--workflow", "workflow.yaml"],
 ];
@@ -57,7 +58,10 @@ fn a_run_with_consent_works_and_the_next_commands_need_none_as_long_as_nothing_i
         let place = Place::new(steps);
         place.good(&["run", "--trust", "workflow.yaml", "--quiet"]);
         assert!(place.was_loaded());
-        for words in COMMANDS.iter().filter(|w| w[0] != "extract") {
+        for words in COMMANDS
+            .iter()
+            .filter(|w| !["extract", "export"].contains(&w[0]))
+        {
             place.good(words);
         }
         // To run it again needs consent again.

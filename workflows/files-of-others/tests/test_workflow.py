@@ -1,47 +1,14 @@
 """The workflow of the example as a user runs it; the same part with an STL file and listed points; and its file, read by another program."""
 
 import json
-import shutil
-import subprocess
-import sys
-from pathlib import Path
 
 import h5py
 import meshio
 import numpy as np
 import pytest
+from conftest import artifact, call
 
-import plyflow
-
-HERE = Path(__file__).resolve().parent.parent
 FORMING = ("draped", "formed")
-
-
-def call(folder, *words, code=0):
-    """What the program says, run in a folder."""
-    done = subprocess.run([str(plyflow.program()), *words], cwd=folder, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)
-    assert done.returncode == code, done.stdout + done.stderr
-    return done.stdout + done.stderr
-
-
-@pytest.fixture(scope="module")
-def study(tmp_path_factory):
-    """A copy of the example, which has been run, with a list of trusted files and a cache of its own."""
-    folder = tmp_path_factory.mktemp("workflows")
-    monkeypatch = pytest.MonkeyPatch()
-    for name, value in (("PLYFLOW_PYTHON", sys.executable), ("XDG_CACHE_HOME", folder / "cache"), ("XDG_CONFIG_HOME", folder / "config")):
-        monkeypatch.setenv(name, str(value))
-    shutil.copytree(HERE, folder / HERE.name, ignore=shutil.ignore_patterns(".plyflow", "__pycache__", "tests", "report*"))
-    shutil.copytree(HERE.parent / "materials", folder / "materials")
-    call(folder / HERE.name, "trust", "step_tool.py", "dxf_outline.py", "mesh_export.py")
-    call(folder / HERE.name, "run", "--no-report", "workflow.yaml")
-    yield folder / HERE.name
-    monkeypatch.undo()
-
-
-def artifact(folder, workflow, step):
-    run = plyflow.open(folder / workflow)
-    return run[step].artifact
 
 
 def test_a_second_run_has_nothing_to_do_and_a_changed_module_runs_its_step_alone(study):

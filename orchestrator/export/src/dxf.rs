@@ -1,0 +1,86 @@
+//! Drawings (DXF of AutoCAD 2000): the flat plies with their fibre lines, and where both lie on the formed part.
+//!
+//! Written here: the crate `dxf` puts the time of day and random numbers into a file, and brings a decoder of pictures along.
+
+mod drawing;
+
+use crate::boundary::loops;
+use crate::error::ExportError;
+use crate::file::File;
+use crate::net::fibres;
+use crate::part::{Body, Part, Ply};
+use crate::request::Request;
+use crate::vec3::Vec3;
+use drawing::Drawing;
+
+/// Writes both drawings.
+pub fn write(
+    part: &Part,
+    request: &Request,
+    files: &mut Vec<File>,
+    told: &mut Vec<String>,
+) -> Result<(), ExportError> {
+    let mut flat = Drawing::new(request.unit, &part.origin);
+    let mut draped = Drawing::new(request.unit, &part.origin);
+    for body in &part.bodies {
+        let ply = body.ply.as_ref().expect("plies alone are drawn");
+        body.tell_missing(told);
+        let (name, colour) = (&body.name, (ply.number % 6 + 1) as u8);
+        let boundary = loops(body.usable().into_iter().map(|c| body.corners(c)));
+        let pattern = pattern(body, ply, part.scale);
+        let edge = flat.layer(name, colour);
+        for line in &pattern {
+            flat.closed_plane(edge, line);
+        }
+        let reached = flat.layer(&format!("{name}-draped"), colour);
+        let edge = draped.layer(name, colour);
+        for line in boundary {
+            let at = |points: &[Vec3]| -> Vec<Vec3> {
+                line.iter().map(|i| points[*i as usize]).collect()
+            };
+            flat.closed_plane(reached, &at(&body.flat));
+            draped.line(edge, &at(&body.points), true);
+        }
+        // Said with the fields already where they are not known.
+        let Some(directions) = ply.sheet.fibres() else {
+            continue;
+        };
+        for (family, angle) in directions.into_iter().enumerate() {
+            let layer = format!("{name}-fibres_{}", family + 1);
+            let (on_flat, on_draped) = (flat.layer(&layer, 8), draped.layer(&layer, 8));
+            for fibre in fibres(body, angle, part.scale * request.net, part.scale)? {
+                flat.open_plane(on_flat, &fibre.flat);
+                draped.line(on_draped, &fibre.formed, false);
+            }
+        }
+    }
+    for (what, drawing) in [("flat", flat), ("draped", draped)] {
+        files.push(File::of_text(
+            format!("{}-{what}.dxf", request.stem),
+            drawing.finish(),
+        ));
+    }
+    Ok(())
+}
+
+/// Edge and holes of the whole flat ply: as the scene has them where the artifact tells, else the boundary of the mesh.
+fn pattern(body: &Body, ply: &Ply, scale: f64) -> Vec<Vec<Vec3>> {
+    let placed = |line: &Vec<[f64; 2]>| {
+        line.iter()
+            .map(|p| [scale * p[0], scale * p[1], 0.0])
+            .collect()
+    };
+    match &ply.sheet.outline {
+        Some(outline) => std::iter::once(outline)
+            .chain(&ply.sheet.holes)
+            .map(placed)
+            .collect(),
+        None => {
+            let of = |line: Vec<u32>| line.iter().map(|i| body.flat[*i as usize]).collect();
+            loops((0..body.count()).map(|c| body.corners(c)))
+                .into_iter()
+                .map(of)
+                .collect()
+        }
+    }
+}
