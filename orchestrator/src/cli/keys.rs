@@ -88,7 +88,9 @@ impl Writer<'_> {
             return plain(one);
         }
         if let Some(dimension) = value.get("x-dimension").as_str() {
-            return dimension.replace('_', " ");
+            let words = value.list("x-words").iter().map(plain);
+            let all = words.chain([dimension.replace('_', " ")]);
+            return all.collect::<Vec<_>>().join(" or ");
         }
         let one_of = value.list("oneOf");
         if !one_of.is_empty() {
@@ -284,6 +286,10 @@ mod tests {
             "  stl: mapping",
             "    unit: length, more than 0 mm, required",
             "    translate: [length, length, length], default [0 m, 0 m, 0 m]",
+            "    up: +x or -x or +y or -y or +z or -z or [number, number, number]",
+            "    rotate: angle or list of mapping",
+            "    centre: auto or [length, length]",
+            "    foot: auto or length",
             "sheets: list of mapping, required",
             "  kind: ply or diaphragm, required",
             "  fibre_2: angle",

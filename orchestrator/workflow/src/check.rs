@@ -5,7 +5,7 @@
 //! Understood: `$ref`, `type`, `properties`, `required`, `additionalProperties`, `items`, `minItems`,
 //! `maxItems`, `const`, `minimum`, `maximum`, `anyOf` (by type and keys of the value), `oneOf` (of constants, or
 //! of one-key mappings), and of ours `x-dimension`, `x-minimum`, `x-maximum`, `x-exclusive-minimum`
-//! (quantities), `x-format: memory` and `x-expected` (what to say when no branch of an `anyOf` fits).
+//! (quantities), `x-words` (that may stand for one), `x-format: memory` and `x-expected` (what to say when no branch of an `anyOf` fits).
 
 use crate::diagnostics::{Diagnostic, Problems, Source};
 use crate::hints::{list_help, mapping_help, number_help};
@@ -134,6 +134,16 @@ impl<'a> Checker<'a> {
         }
         let schema = &self.choose(schema.clone(), node);
         if let Some(dimension) = schema.text("x-dimension") {
+            let words = schema.get("x-words").and_then(Value::as_array);
+            if let (Some(words), Some(text)) = (words, node.text()) {
+                if words.iter().any(|w| w == text) {
+                    return;
+                }
+                if text.starts_with(|c: char| c.is_ascii_alphabetic()) {
+                    let expected = format!("{} or a {dimension} with its unit", or_words(words));
+                    return self.wrong_type(node, what, &expected, key, None);
+                }
+            }
             self.quantity(node, schema, dimension, what, key);
         } else if schema.text("x-format") == Some("memory") {
             self.memory(node, what, key);
@@ -426,6 +436,12 @@ impl<'a> Checker<'a> {
             }
         }
     }
+}
+
+/// Words that may stand for a quantity, for messages.
+fn or_words(words: &[Value]) -> String {
+    let words = words.iter().filter_map(Value::as_str);
+    words.map(|w| format!("`{w}`")).collect::<Vec<_>>().join(" or ")
 }
 
 /// Reports every repeated key of a tree.
