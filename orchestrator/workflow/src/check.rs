@@ -441,7 +441,10 @@ impl<'a> Checker<'a> {
 /// Words that may stand for a quantity, for messages.
 fn or_words(words: &[Value]) -> String {
     let words = words.iter().filter_map(Value::as_str);
-    words.map(|w| format!("`{w}`")).collect::<Vec<_>>().join(" or ")
+    words
+        .map(|w| format!("`{w}`"))
+        .collect::<Vec<_>>()
+        .join(" or ")
 }
 
 /// Reports every repeated key of a tree.
