@@ -133,7 +133,7 @@ fn told(study: &Study, folder: &Utf8Path) -> String {
     };
     format!(
         "The tool is {x} long, {y} wide and {z} high; {placed}. Go on with\n\n  cd {}\n  plyflow run workflow.yaml --until drape    # a second: does \
-         it stand as it should?\n  plyflow run workflow.yaml --until {whole}   # the whole part\n  plyflow run workflow.yaml\n\nEach writes report.html. \
+         it stand as it should?\n  plyflow run workflow.yaml --until {whole}   # the whole part\n  plyflow run workflow.yaml\n\nEach ends with the path of its report. \
          scene.yaml says what was guessed.\n",
         quoted(folder.as_str())
     )

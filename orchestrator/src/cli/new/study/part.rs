@@ -65,7 +65,7 @@ impl Part {
             (x * x + y * y).sqrt()
         };
         let size: [f64; 3] = std::array::from_fn(|k| high[k] - low[k]);
-        let (radius, sharp) = roundings(facets);
+        let (radius, sharp) = roundings(facets, stand.up);
         let largest = size.into_iter().fold(0.0, f64::max);
         (largest > 0.0).then(|| Self {
             words: words(&place),
@@ -108,8 +108,12 @@ fn bounds(place: &Place, unit: f64, facets: &[Facet]) -> Option<[[f64; 3]; 2]> {
 }
 
 /// The smallest radius of what is rounded, in the facets' units, and whether there are sharp edges: two facets that are chords of an arc are bent
-/// by their width over its radius.
-fn roundings(facets: &[Facet]) -> (Option<f64>, bool) {
+/// by their width over its radius. The edge around the foot does not count: no ply lies over it.
+fn roundings(facets: &[Facet], up: [f64; 3]) -> (Option<f64>, bool) {
+    let along = |p: &[f64; 3]| (0..3).map(|k| p[k] * up[k]).sum::<f64>();
+    let heights = || facets.as_flattened().iter().map(along);
+    let low = heights().fold(f64::INFINITY, f64::min);
+    let foot = low + 1e-3 * (heights().fold(f64::NEG_INFINITY, f64::max) - low);
     let mut edges: HashMap<[[u64; 3]; 2], usize> = HashMap::new();
     let (mut bent, mut all, mut sharp) = (Vec::new(), 0.0, 0.0);
     for (k, facet) in facets.iter().enumerate() {
@@ -120,6 +124,9 @@ fn roundings(facets: &[Facet]) -> (Option<f64>, bool) {
                 edges.insert([key(a), key(b)], k);
                 continue;
             };
+            if along(&a) <= foot && along(&b) <= foot {
+                continue;
+            }
             let (length, angle) = (norm(sub(b, a)), angle(facet, &facets[other]));
             all += length;
             if angle > SHARP {
@@ -226,6 +233,28 @@ mod tests {
         let box_of = hat([300.0, 120.0, 40.0, 1e-9]);
         let part = Part::new(&box_of, 1e-3).unwrap();
         assert!(part.sharp, "{part:?}");
+        // A pyramid: sharp above, and its foot is closed.
+        let corner = |k: usize| {
+            [
+                [-50.0, -50.0, 0.0],
+                [50.0, -50.0, 0.0],
+                [50.0, 50.0, 0.0],
+                [-50.0, 50.0, 0.0],
+            ][k % 4]
+        };
+        let flank = |k: usize, top: f64| [corner(k), corner(k + 1), [0.0, 0.0, top]];
+        let foot = [
+            [corner(0), corner(2), corner(1)],
+            [corner(0), corner(3), corner(2)],
+        ];
+        let with = |top: f64| {
+            let mut all: Vec<Facet> = (0..4).map(|k| flank(k, top)).collect();
+            all.extend(foot);
+            Part::new(&all, 1e-3).unwrap()
+        };
+        assert!(with(50.0).sharp);
+        // So flat that above only the foot's edge is one.
+        assert!(!with(5.0).sharp);
         assert_eq!(Part::new(&[], 1e-3), None);
     }
 }

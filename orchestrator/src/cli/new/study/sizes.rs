@@ -36,7 +36,7 @@ pub fn elements(part: &Part, ply: [f64; 2]) -> (Elements, [Chosen; 2]) {
     let zone = (2e3 * wanted.max(0.25 * whole)).round().max(2.0) * 0.5e-3;
     let whole_why = format!(
         "a twelfth of the narrower of tool and ply ({}), between 4 and 16 mm: enough to see where it shears and stands off the tool. Half of it shows what changes",
-        mm(across)
+        mm((1e4 * across).round() * 1e-4)
     );
     let zone_why = match part.radius {
         Some(r) if zone <= 0.4 * r * 1.02 => format!(
