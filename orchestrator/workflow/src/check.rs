@@ -8,7 +8,7 @@
 //! (quantities), `x-words` (that may stand for one), `x-format: memory` and `x-expected` (what to say when no branch of an `anyOf` fits).
 
 use crate::diagnostics::{Diagnostic, Problems, Source};
-use crate::hints::{list_help, mapping_help, number_help};
+use crate::hints::{has_words, list_help, mapping_help, number_help, or_words};
 use crate::yaml::{Kind, Node, Span};
 use plyflow_model::manifest::one_of;
 use plyflow_model::units::{Dimension, parse_quantity};
@@ -438,15 +438,6 @@ impl<'a> Checker<'a> {
     }
 }
 
-/// Words that may stand for a quantity, for messages.
-fn or_words(words: &[Value]) -> String {
-    let words = words.iter().filter_map(Value::as_str);
-    words
-        .map(|w| format!("`{w}`"))
-        .collect::<Vec<_>>()
-        .join(" or ")
-}
-
 /// Reports every repeated key of a tree.
 pub fn repeated_keys(node: &Node, source: &Source, problems: &mut Problems) {
     let entries = node.entries();
@@ -591,7 +582,8 @@ fn type_fits(schema: &View<'_>, node: &Node) -> bool {
         Kind::Null => schema.takes("null"),
         Kind::Bool(_) => schema.takes("boolean"),
         Kind::Number(_) => schema.takes("number") || schema.takes("integer"),
-        Kind::Text(_) => schema.takes("string"),
+        // Of a list of words none has a type beside it.
+        Kind::Text(_) => schema.takes("string") || schema.get("oneOf").is_some_and(has_words),
         Kind::List(_) => schema.takes("array"),
         Kind::Map(_) => schema.takes("object") || schema.get("oneOf").is_some(),
     }
