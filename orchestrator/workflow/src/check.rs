@@ -127,7 +127,12 @@ impl<'a> Checker<'a> {
     }
 
     fn value(&mut self, node: &Node, schema: &View<'a>, what: &str, key: &Span) {
-        if let Some(expected) = schema.text("x-expected")
+        // Of what may be left out it stands on the branch.
+        let branches = schema.get("anyOf").and_then(Value::as_array);
+        let of_branch = |b: &'a Value| View(self.follow(b)).text("x-expected");
+        let inner = branches.filter(|b| b.iter().any(|b| b["type"] == "null"));
+        let inner = inner.and_then(|b| b.iter().find_map(of_branch));
+        if let Some(expected) = schema.text("x-expected").or(inner)
             && !self.fits_a_branch(schema, node)
         {
             return self.wrong_type(node, what, expected, key, None);

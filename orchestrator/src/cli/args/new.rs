@@ -51,9 +51,15 @@ pub struct StudyWords {
     /// Length of one unit of the tool's file: mm, cm, m, in, ft or such as '0.1 mm'
     #[arg(long, value_name = "UNIT", help_heading = "A study")]
     pub unit: Option<String>,
-    /// Length and width of the plies: '400 x 200 mm'
+    /// Length and width of the plies: '400 x 200 mm'; beside --dxf those of the box around the outline, where the drawing does not tell
     #[arg(long, value_name = "SIZE", help_heading = "A study")]
     pub ply: Option<String>,
+    /// A DXF drawing with the outline of the plies; a step in Python reads it, which is copied into the study
+    #[arg(long, value_name = "FILE", help_heading = "A study")]
+    pub dxf: Option<Utf8PathBuf>,
+    /// The layer of the drawing with the outline, where several have curves
+    #[arg(long, value_name = "LAYER", requires = "dxf", help_heading = "A study")]
+    pub layer: Option<String>,
     /// A material file, or the name of one that comes along, such as woven-38616: it is copied
     #[arg(long, value_name = "NAME|FILE", help_heading = "A study")]
     pub material: Option<String>,
@@ -78,6 +84,8 @@ impl StudyWords {
             (self.tool.is_some(), "--tool"),
             (self.unit.is_some(), "--unit"),
             (self.ply.is_some(), "--ply"),
+            (self.dxf.is_some(), "--dxf"),
+            (self.layer.is_some(), "--layer"),
             (self.material.is_some(), "--material"),
             (!self.angles.is_empty(), "--angles"),
             (self.process.is_some(), "--process"),

@@ -1,6 +1,7 @@
 //! `new study`: a scene and a workflow for a part of one's own, from an answer to each of five questions.
 
 mod ask;
+mod drawing;
 mod part;
 mod sizes;
 mod text;
@@ -32,10 +33,13 @@ struct Answers {
     tool: String,
     facets: Vec<[[f64; 3]; 3]>,
     unit: String,
-    ply: String,
+    ply: [f64; 2],
     material: String,
     process: StudyProcess,
 }
+
+/// The step that reads a drawing: its files, in the folder of the workflows that come along.
+const DXF_STEP: [&str; 2] = ["dxf_outline.py", "dxf_reading.py"];
 
 /// The files of a new study by their paths in its folder, and what to say of it.
 ///
@@ -47,7 +51,8 @@ pub fn files(
     answers: Option<&mut dyn BufRead>,
 ) -> Result<(Vec<(Utf8PathBuf, String)>, String), Stop> {
     let wrong = |text: String| Stop::new(exit::USAGE, text);
-    let materials = shipped::workflows()?.join("materials");
+    let shipped = shipped::workflows()?;
+    let materials = shipped.join("materials");
     let of = answered(args, &materials, answers)?;
     let (metres, unit) = words::unit(&of.unit).map_err(wrong)?;
     let part = Part::new(&of.facets, metres)
@@ -58,12 +63,22 @@ pub fn files(
         let film = text_of(&materials.join("stretchlon-ht350.yaml"))?;
         files.push((Utf8PathBuf::from(FILM), film));
     }
+    let outline = args.study.dxf.as_deref();
+    let outline = outline.map(|dxf| from_folder(folder, dxf)).transpose()?;
+    if outline.is_some() {
+        for name in DXF_STEP {
+            let text = text_of(&shipped.join("files-of-others").join(name))?;
+            files.push((Utf8PathBuf::from(name), text));
+        }
+    }
     let study = Study {
         name: args.name.clone(),
         tool: from_folder(folder, Utf8Path::new(&of.tool))?,
         unit,
         part,
-        ply: words::ply(&of.ply).map_err(wrong)?,
+        ply: of.ply,
+        outline,
+        layer: args.study.layer.clone(),
         material,
         sheet,
         angles: angles(&args.study.angles)?,
@@ -90,8 +105,7 @@ fn answered(
     let question = format!("Which unit does it have?{}", in_units(&facets));
     let unit = given.unit.as_deref();
     let unit = asker.value(unit, "--unit UNIT", &question, Some("mm"))?;
-    let question = "How large are the plies, such as '400 x 200 mm'?";
-    let ply = asker.value(given.ply.as_deref(), "--ply SIZE", question, None)?;
+    let ply = ply(args, &mut asker)?;
     let names = shipped_names(materials).join(", ");
     let question = format!("Which material: a file, or one of {names}?");
     let material = given.material.as_deref();
@@ -104,8 +118,8 @@ fn answered(
         }
         _ => stop,
     })?;
-    match [tool, unit, ply, material] {
-        [Some(tool), Some(unit), Some(ply), Some(material)] => Ok(Answers {
+    match (tool, unit, ply, material) {
+        (Some(tool), Some(unit), Some(ply), Some(material)) => Ok(Answers {
             tool,
             facets,
             unit,
@@ -115,6 +129,36 @@ fn answered(
         }),
         _ => Err(Stop::new(exit::INTERNAL, "an answer is missing")),
     }
+}
+
+/// Length and width of the plies, or of the box around their outline (m). `None` where they are missing and nobody answers.
+fn ply(args: &NewArgs, asker: &mut Asker<'_>) -> Result<Option<[f64; 2]>, Stop> {
+    let wrong = |text: String| Stop::new(exit::USAGE, text);
+    let words = &args.study;
+    if let (Some(dxf), None) = (&words.dxf, &words.ply) {
+        let bytes = open::read(dxf.as_std_path(), MOST_DATA)
+            .map_err(|e| wrong(format!("--dxf {dxf}: {e}; expected a DXF drawing")))?;
+        let text = String::from_utf8_lossy(&bytes);
+        let size = drawing::size(&text, words.layer.as_deref());
+        return size.map(Some).ok_or_else(|| {
+            let what = match &words.layer {
+                Some(layer) => format!("its curves on the layer `{layer}`"),
+                None => "its curves".to_owned(),
+            };
+            wrong(format!(
+                "--dxf {dxf}: nothing tells how large {what} are, or in which unit ($INSUNITS); expected a text DXF with lines, arcs or polylines \
+                 outside of blocks. Say how large the box around the outline is with --ply, such as --ply '400 x 200 mm'"
+            ))
+        });
+    }
+    if let Some(dxf) = words.dxf.as_ref().filter(|d| !d.is_file()) {
+        return Err(wrong(format!("--dxf {dxf}: there is no such file")));
+    }
+    let question = "How large are the plies, such as '400 x 200 mm'?";
+    let option = "--ply SIZE or --dxf FILE";
+    let size = asker.value(words.ply.as_deref(), option, question, None)?;
+    size.map(|size| words::ply(&size).map_err(wrong))
+        .transpose()
 }
 
 /// What is said of a study that has been written.
@@ -127,14 +171,22 @@ fn told(study: &Study, folder: &Utf8Path) -> String {
             study.part.words.join(", ")
         ),
     };
+    let (trust, needs) = match study.outline {
+        Some(_) => (
+            " --trust",
+            " The drawing is read by dxf_outline.py, which lies in the folder now: `--trust` lets it run, and it needs a Python with `numpy`, `ezdxf` \
+             and `shapely` (docs/guide/files-of-others.md).",
+        ),
+        None => ("", ""),
+    };
     let whole = match study.process {
         StudyProcess::DoubleDiaphragm => "coarse",
         StudyProcess::Press => "formed",
     };
     format!(
-        "The tool is {x} long, {y} wide and {z} high; {placed}. Go on with\n\n  cd {}\n  plyflow run workflow.yaml --until drape    # a second: does \
-         it stand as it should?\n  plyflow run workflow.yaml --until {whole}   # the whole part\n  plyflow run workflow.yaml\n\nEach ends with the path of its report. \
-         scene.yaml says what was guessed.\n",
+        "The tool is {x} long, {y} wide and {z} high; {placed}. Go on with\n\n  cd {}\n  plyflow run{trust} workflow.yaml --until drape    # a second: does \
+         it stand as it should?\n  plyflow run{trust} workflow.yaml --until {whole}   # the whole part\n  plyflow run{trust} workflow.yaml\n\nEach ends with the path of its report. \
+         scene.yaml says what was guessed.{needs}\n",
         quoted(folder.as_str())
     )
 }

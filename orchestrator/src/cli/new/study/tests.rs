@@ -48,6 +48,8 @@ fn args(root: &Utf8Path) -> NewArgs {
             tool: Some(root.join("my block.stl")),
             unit: Some("mm".into()),
             ply: Some("400 x 200 mm".into()),
+            dxf: None,
+            layer: None,
             material: Some(root.join("cloth.yaml").into()),
             angles: vec![45.0, -45.0],
             process: None,
@@ -145,7 +147,9 @@ fn what_is_missing_or_wrong_is_told_with_what_would_do() {
         );
         let nothing = told(&|w| *w = StudyWords::default());
         assert!(
-            nothing.contains("--tool FILE, --unit UNIT, --ply SIZE, --material NAME|FILE"),
+            nothing.contains(
+                "--tool FILE, --unit UNIT, --ply SIZE or --dxf FILE, --material NAME|FILE"
+            ),
             "{nothing}"
         );
         let material = told(&|w| w.material = Some("wool".into()));
@@ -184,5 +188,45 @@ fn on_a_terminal_it_asks_and_shows_how_large_the_tool_would_be() {
             "{scene}"
         );
         assert!(scene.contains("fibre_1: 0 deg"), "{scene}");
+    });
+}
+
+#[test]
+fn an_outline_of_a_drawing_is_read_by_a_step_that_comes_along() {
+    with_files(|root| {
+        let shipped = shipped::workflows().unwrap().join("files-of-others");
+        let mut args = args(root);
+        (args.study.ply, args.study.dxf) = (None, Some(shipped.join("blank.dxf")));
+        args.study.layer = Some("PLY".into());
+        let (files, told) = files(&args, &root.join("new"), None).unwrap();
+        let scene = file(&files, "scene.yaml");
+        assert!(
+            scene.contains("outline: {input: outline}") && !scene.contains("width: 200"),
+            "{scene}"
+        );
+        let workflow = file(&files, "workflow.yaml");
+        assert!(workflow.contains("plugin: ./dxf_outline.py"), "{workflow}");
+        assert!(
+            workflow.contains("blank.dxf, layers: {outline: PLY}, centred: true}"),
+            "{workflow}"
+        );
+        assert_eq!(workflow.matches("geometry: blank").count(), 3, "{workflow}");
+        assert!(
+            workflow.contains("from: {boundary: boundary, geometry: blank}"),
+            "{workflow}"
+        );
+        assert!(file(&files, "dxf_outline.py").contains("dxf-outline"));
+        assert!(file(&files, "dxf_reading.py").contains("ezdxf"));
+        assert!(
+            told.contains("run --trust workflow.yaml --until drape"),
+            "{told}"
+        );
+        args.study.layer = Some("GONE".into());
+        let stop = super::files(&args, &root.join("new"), None).unwrap_err();
+        assert!(
+            stop.text.contains("on the layer `GONE`") && stop.text.contains("--ply '400"),
+            "{}",
+            stop.text
+        );
     });
 }

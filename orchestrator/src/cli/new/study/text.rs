@@ -17,8 +17,12 @@ pub struct Study {
     pub unit: String,
     /// What the file tells.
     pub part: Part,
-    /// Length and width of the plies (m).
+    /// Length and width of the plies, or of the box around their outline (m).
     pub ply: [f64; 2],
+    /// The drawing with their outline, from the study's folder.
+    pub outline: Option<String>,
+    /// The layer on which it is drawn, where that has to be said.
+    pub layer: Option<String>,
     /// The plies' material file, from the study's folder.
     pub material: String,
     /// Its thickness (m) and areal mass (kg/m2), where they are known.
@@ -63,13 +67,19 @@ impl Study {
             text += &film("lower_film");
         }
         for (k, angle) in self.angles.iter().enumerate() {
+            let size = match self.outline {
+                Some(_) => "outline: {input: outline}".to_owned(),
+                None => format!(
+                    "length: {}\n    width: {}",
+                    mm(self.ply[0]),
+                    mm(self.ply[1])
+                ),
+            };
             let _ = write!(
                 text,
-                "  - name: ply_{}\n    kind: ply\n    material: {}\n    length: {}\n    width: {}\n    fibre_1: {angle} deg\n    fibre_2: {} deg\n",
+                "  - name: ply_{}\n    kind: ply\n    material: {}\n    {size}\n    fibre_1: {angle} deg\n    fibre_2: {} deg\n",
                 k + 1,
                 quoted(&self.material),
-                mm(self.ply[0]),
-                mm(self.ply[1]),
                 angle + 90.0
             );
         }
@@ -177,13 +187,45 @@ impl Study {
         }
     }
 
-    fn drape(&self, size: &str) -> String {
+    /// The step that reads the drawing, if there is one.
+    fn blank(&self) -> String {
+        let Some(dxf) = &self.outline else {
+            return String::new();
+        };
+        let layer = self.layer.as_deref().map(quoted);
+        let layers = layer.map_or(String::new(), |l| format!(", layers: {{outline: {l}}}"));
         comment(
             2,
-            "In a second: geometry alone shows where the plies shear, and whether the tool stands as it should.",
+            "The outline of the plies, its middle moved to (0, 0). `centre` of a ply in the scene moves it over the tool.",
         ) + &format!(
-            "  drape:\n    plugin: forming-kinematic\n    with: {{scene: scene.yaml, element_size: {size}}}\n"
+            "  blank:\n    plugin: ./dxf_outline.py\n    with: {{file: {}{layers}, centred: true}}\n",
+            quoted(dxf)
         )
+    }
+
+    /// What a step that forms over the scene takes besides.
+    fn wires(&self, others: &str) -> String {
+        let geometry = self.outline.as_ref().map(|_| "geometry: blank");
+        let all: Vec<&str> = [others]
+            .into_iter()
+            .filter(|o| !o.is_empty())
+            .chain(geometry)
+            .collect();
+        match all.is_empty() {
+            true => String::new(),
+            false => format!("    from: {{{}}}\n", all.join(", ")),
+        }
+    }
+
+    fn drape(&self, size: &str) -> String {
+        self.blank()
+            + &comment(
+                2,
+                "In a second: geometry alone shows where the plies shear, and whether the tool stands as it should.",
+            )
+            + &format!(
+                "  drape:\n    plugin: forming-kinematic\n    with: {{scene: scene.yaml, element_size: {size}}}\n"
+            )
     }
 
     fn bag_steps(&self) -> String {
@@ -198,7 +240,8 @@ impl Study {
         );
         let _ = writeln!(
             text,
-            "  coarse:\n    plugin: forming-explicit\n    with: {{scene: scene.yaml, element: m4, element_size: {}}}",
+            "  coarse:\n    plugin: forming-explicit\n{}    with: {{scene: scene.yaml, element: m4, element_size: {}}}",
+            self.wires(""),
             whole.value
         );
         text += &comment(
@@ -216,9 +259,10 @@ impl Study {
         let _ = write!(
             text,
             "  boundary:\n    plugin: boundary-interpolation\n    for_each: {{zone: zones}}\n    from: {{formed: coarse, zones: zones}}\n    with: {{element_size: {}, cut_stiffness: 10 MPa}}\n\
-             \x20 local:\n    plugin: forming-explicit\n    for_each: {{zone: zones}}\n    from: {{boundary: boundary}}\n    with: {{scene: scene.yaml, element: rf4}}\n\
+             \x20 local:\n    plugin: forming-explicit\n    for_each: {{zone: zones}}\n{}    with: {{scene: scene.yaml, element: rf4}}\n\
              \x20 comparison:\n    plugin: comparison\n    from: {{global: coarse, zones: zones, local: local, others: drape}}\n",
-            zone.value
+            zone.value,
+            self.wires("boundary: boundary")
         );
         text + &expected(&[
             (
@@ -257,9 +301,10 @@ impl Study {
         );
         let _ = write!(
             text,
-            "  formed:\n    plugin: forming-explicit\n    with:\n      scene: scene.yaml\n      element: {{plugin: rf4, with: {{hourglass_floor: 100 N/m, thickening: 2}}}}\n      \
+            "  formed:\n    plugin: forming-explicit\n{}    with:\n      scene: scene.yaml\n      element: {{plugin: rf4, with: {{hourglass_floor: 100 N/m, thickening: 2}}}}\n      \
              element_size: {}\n      time_step: {} us\n      least_areal_mass: {mass} kg/m2\n      contact_augmentation: 0\n\
              \x20 defects:\n    plugin: defect-measurement\n    from: {{formed: formed}}\n",
+            self.wires(""),
             mm(size),
             // What the hemisphere's ply of the same kind is run with.
             (5e3 * size).round() / 10.0
