@@ -251,7 +251,13 @@ fn words_that_place_a_tool_are_read_in_all_their_forms_and_wrong_ones_are_told_w
             &["the vector has no length", "such as `+y`"],
         ),
         ("up: [0, 1]", &["`up` has 2 items", "3 items"]),
-        ("rotate: 90", &["`90` has no unit", "`90 deg`"]),
+        (
+            "rotate: 90",
+            &[
+                "`rotate` is the number 90",
+                "an angle about z such as `90 deg`",
+            ],
+        ),
         (
             "rotate: [{axis: +z}]",
             &["`angle` is missing in `rotate[0]`"],

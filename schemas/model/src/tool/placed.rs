@@ -3,9 +3,9 @@
 use crate::artifact::ToolPlacement;
 use crate::tool::place::Place;
 
-/// Placed coordinates are whole multiples of this part of a metre: what is left in their last digits by the place that they had in the file reaches
-/// no result.
-pub const GRAIN: f64 = 1e12;
+/// Placed coordinates are decimals of a millimetre with whole multiples of this part of it (1 pm), as a file in mm has them that lies in its place: what is
+/// left in their last digits by the place that they had reaches no result.
+const GRAIN: f64 = 1e9;
 
 /// From what was given to the scene: `turn (unit (p - from)) + to`.
 ///
@@ -88,8 +88,9 @@ impl Placed {
             return std::array::from_fn(|k| p[k] * self.unit + self.to[k]);
         }
         let about = self.about_from(p);
-        // Adding zero turns -0 into 0.
-        std::array::from_fn(|k| ((about[k] + self.to[k]) * GRAIN).round() / GRAIN + 0.0)
+        // The decimal first and then its unit, as of a file's coordinates. Adding zero turns -0 into 0.
+        let decimal = |x: f64| (x * 1e3 * GRAIN).round() / GRAIN;
+        std::array::from_fn(|k| decimal(about[k] + self.to[k]) * 1e-3 + 0.0)
     }
 
     /// A point of the scene (m) in what was given, in its units.
@@ -259,7 +260,7 @@ mod tests {
         let here: Vec<[f64; 3]> = (0..1000)
             .map(|k| {
                 let k = f64::from(k);
-                [0.1 * (k % 7.0), 0.1 * (k % 11.0), 0.1 * (k % 13.0)].map(|c| c + 0.03)
+                [k % 7.0, k % 11.0, k % 13.0].map(|c| (c * 100.0 + 30.0).round() / 1e3)
             })
             .collect();
         let words = json!({"up": "+y", "rotate": "90 deg", "centre": "auto", "foot": "auto"});
@@ -274,11 +275,18 @@ mod tests {
             .map(|[x, y, z]| [-12_345.678 + y, 20_000.0 + z, 17_654.321 + x].map(|c| c / 25.4))
             .collect();
         let far = Placed::of(&place(words), 0.0254, there.iter()).unwrap();
+        // The same without any words, where the box is of that place.
+        let at = json!({"up": "+y", "rotate": "90 deg", "centre": ["0.33 mm", "0.53 mm"], "foot": "0.03 mm"});
+        let plain = Placed::moved(1e-3, [0.0; 3]);
+        let there_too = Placed::of(&place(at), 0.0254, there.iter()).unwrap();
         let mut different = 0;
         for (p, q) in here.iter().zip(&there) {
-            let (a, b) = (near.put(*p), far.put(*q));
-            let [x, y, z] = a;
-            different += usize::from([x, y, z].map(f64::to_bits) != b.map(f64::to_bits));
+            for (a, b) in [
+                (near.put(*p), far.put(*q)),
+                (plain.put(*p), there_too.put(*q)),
+            ] {
+                different += usize::from(a.map(f64::to_bits) != b.map(f64::to_bits));
+            }
         }
         assert_eq!(different, 0);
     }

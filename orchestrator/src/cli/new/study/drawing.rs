@@ -130,4 +130,35 @@ mod tests {
             "{length} {width}"
         );
     }
+
+    #[test]
+    fn a_drawing_that_is_damaged_has_a_finite_size_or_none() {
+        let text = include_str!("../../../../../workflows/files-of-others/blank.dxf");
+        // A generator of our own, so that a failure comes again.
+        let mut state = 1_u64;
+        let mut next = |below: usize| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 33) as usize % below
+        };
+        let mut sizes = 0;
+        for _ in 0..300 {
+            let mut lines: Vec<&str> = text.lines().collect();
+            for _ in 0..=next(4) {
+                let at = next(lines.len());
+                match next(4) {
+                    0 => drop(lines.remove(at)),
+                    1 => lines.insert(at, ["0", "-1", "NaN", "1e999", "SECTION"][next(5)]),
+                    2 => lines.truncate(at.max(1)),
+                    _ => lines[at] = ["0", "10", "inf", "9223372036854775808", ""][next(5)],
+                }
+            }
+            if let Some(size) = size(&lines.join("\n"), None) {
+                assert!(size.iter().all(|s| s.is_finite() && *s > 0.0), "{size:?}");
+                sizes += 1;
+            }
+        }
+        assert!(sizes > 10, "{sizes}");
+    }
 }

@@ -146,7 +146,7 @@ fn a_tool_in_aircraft_coordinates_and_inches_is_draped_as_the_one_in_its_place_t
     let block = rounded_block();
     let folder = tempfile::tempdir().unwrap();
     let [here, there] = ["here.stl", "there.stl"].map(|n| folder.path().join(n));
-    write_text(&here, &block, |p| p);
+    write_text(&here, &block, |p| p.map(|c| (c * 1e9).round() / 1e6));
     write_text(&there, &block, to_aircraft);
     let listed = json!([
         ["-0.05 m", "-0.04 m"],
@@ -160,7 +160,7 @@ fn a_tool_in_aircraft_coordinates_and_inches_is_draped_as_the_one_in_its_place_t
         all["file"] = json!(file.to_str().unwrap());
         json!({ "stl": all })
     };
-    let own = formed(stl(&here, json!({"unit": "1 m"}))).unwrap();
+    let own = formed(stl(&here, json!({"unit": "1 mm"}))).unwrap();
     let words =
         json!({"unit": "1 in", "up": "+y", "rotate": "90 deg", "centre": "auto", "foot": "auto"});
     let placed = formed(stl(&there, words)).unwrap();

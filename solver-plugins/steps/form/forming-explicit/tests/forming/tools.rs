@@ -339,11 +339,11 @@ mod stl {
             std::fs::write(&file, text + "endsolid dome\n").unwrap();
             file
         };
-        let here = write("here.stl", &|q| q);
+        let here = write("here.stl", &|q| q.map(|c| (c * 1e9).round() / 1e6));
         let there = write("there.stl", &|[x, y, z]| {
             [y + 4.123, z - 1.5, x + 20.456].map(|c| c / 0.0254)
         });
-        let (own, a) = over_tool(Some(json!({"stl": {"file": here, "unit": "1 m"}})));
+        let (own, a) = over_tool(Some(json!({"stl": {"file": here, "unit": "1 mm"}})));
         let (placed, b) = over_tool(Some(json!({"stl": {
             "file": there, "unit": "1 in", "up": "+y", "rotate": "90 deg", "centre": "auto", "foot": "auto"}})));
         assert!(a.cycles > 100 && a.cycles == b.cycles);
