@@ -23,7 +23,11 @@ use template::Language;
 /// are not to be found.
 pub fn new(args: &NewArgs) -> Done {
     let wrong = |text: String| Stop::new(exit::USAGE, text);
-    if let Some(text) = name::malformed(&args.name) {
+    let what = match args.kind {
+        NewKind::Study => "study",
+        _ => "plugin",
+    };
+    if let Some(text) = name::malformed(&args.name, what) {
         return Err(wrong(text));
     }
     let folder = match &args.into {
