@@ -326,7 +326,7 @@ fn angles(given: &[f64]) -> Result<Vec<f64>, Stop> {
     if given.is_empty() {
         return Ok(vec![0.0]);
     }
-    if given.len() > MOST_PLIES || given.iter().any(|a| !(a.abs() <= 360.0)) {
+    if given.len() > MOST_PLIES || given.iter().any(|a| !(0.0..=360.0).contains(&a.abs())) {
         let text = format!(
             "--angles: expected 1 to {MOST_PLIES} angles between -360 and 360 degrees, such as `--angles 45,-45`"
         );
