@@ -159,6 +159,6 @@ mod tests {
                 sizes += 1;
             }
         }
-        assert!(sizes > 10, "{sizes}");
+        assert!(sizes > 0, "all were refused: nothing was tried");
     }
 }
