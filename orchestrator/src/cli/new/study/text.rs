@@ -224,7 +224,8 @@ impl Study {
                 "In a second: geometry alone shows where the plies shear, and whether the tool stands as it should.",
             )
             + &format!(
-                "  drape:\n    plugin: forming-kinematic\n    with: {{scene: scene.yaml, element_size: {size}}}\n"
+                "  drape:\n    plugin: forming-kinematic\n{}    with: {{scene: scene.yaml, element_size: {size}}}\n",
+                self.wires("")
             )
     }
 
