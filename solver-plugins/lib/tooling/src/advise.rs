@@ -55,9 +55,8 @@ pub(crate) fn advice(scene: &Scene, spacing: f64) -> Option<String> {
         unit,
         place,
     };
-    let likely = given.candidates(spacing);
-    let tried = likely.into_iter().take(MOST_TRIED);
-    let (found, size) = tried.into_iter().find_map(|candidate| {
+    let mut likely = given.candidates(spacing).into_iter().take(MOST_TRIED);
+    let (found, size) = likely.find_map(|candidate| {
         let mut scene = scene.clone();
         scene.tool = candidate.of(&scene.tool);
         let mesh = checks(&scene, spacing).ok()?;
