@@ -18,6 +18,9 @@ const SHARP: f64 = 0.6;
 /// Share of the bent length that may be sharper than the radius that counts.
 const SHARPER: f64 = 0.02;
 
+/// A rounding of a smaller radius (m) is an edge to any ply.
+const EDGE: f64 = 1e-4;
+
 /// How far (m) a tool may lie off its place and be left there.
 const IN_PLACE: f64 = 1e-5;
 
@@ -66,6 +69,8 @@ impl Part {
         };
         let size: [f64; 3] = std::array::from_fn(|k| high[k] - low[k]);
         let (radius, sharp) = roundings(facets, stand.up);
+        let radius = radius.map(|r| r * unit);
+        let sharp = sharp || radius.is_some_and(|r| r < EDGE);
         let largest = size.into_iter().fold(0.0, f64::max);
         (largest > 0.0).then(|| Self {
             words: words(&place),
@@ -76,7 +81,7 @@ impl Part {
                 .map(from_axis)
                 .fold(0.0, f64::max),
             undercut: stand.undercut,
-            radius: radius.map(|r| r * unit),
+            radius: radius.filter(|r| *r >= EDGE),
             sharp,
         })
     }
@@ -181,10 +186,10 @@ fn angle(a: &Facet, b: &Facet) -> f64 {
 mod tests {
     use super::*;
 
-    /// A hat along x: flanks and a top, between them arcs of `radius`; without ends.
+    /// A hat along x: upright walls and a top, between them arcs of `radius`; without ends.
     fn hat([length, width, height, radius]: [f64; 4]) -> Vec<Facet> {
         let half = 0.5 * width;
-        let mut line = vec![[-half - 10.0, 0.0]];
+        let mut line = vec![[-half, 0.0]];
         for k in 0..=12 {
             let a = std::f64::consts::PI - FRAC_PI_2 * f64::from(k) / 12.0;
             line.push([
@@ -215,7 +220,7 @@ mod tests {
         let here = Part::new(&there, 1e-3).unwrap();
         assert_eq!(here.words, Vec::<String>::new());
         let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
-        assert!(close(here.size[0], 0.3) && close(here.size[1], 0.14) && close(here.size[2], 0.04));
+        assert!(close(here.size[0], 0.3) && close(here.size[1], 0.12) && close(here.size[2], 0.04));
         assert!((here.radius.unwrap() / 6e-3 - 1.0).abs() < 0.05, "{here:?}");
         assert!(!here.sharp && here.undercut < 1e-9);
 

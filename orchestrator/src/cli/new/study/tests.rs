@@ -126,7 +126,7 @@ fn a_press_has_a_die_that_its_punch_goes_through_and_no_films() {
             workflow.contains("least_areal_mass: 0.21 kg/m2"),
             "{workflow}"
         );
-        assert!(!workflow.contains("zones"), "{workflow}");
+        assert!(!workflow.contains("zone-extraction"), "{workflow}");
     });
 }
 
