@@ -306,7 +306,7 @@ mod stl {
 
     /// A ply pressed over a dome, or over what a file holds.
     fn over(file: Option<&Path>) -> (Forming, Outcome) {
-        let of_file = |file| json!({"stl": {"file": file, "unit": "1 mm", "translate": ORIGIN.map(|x| format!("{x} mm"))}});
+        let of_file = |file: &Path| json!({"stl": {"file": file, "unit": "1 mm", "translate": ORIGIN.map(|x| format!("{x} mm"))}});
         over_tool(file.map(of_file))
     }
 
