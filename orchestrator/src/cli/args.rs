@@ -8,7 +8,7 @@ mod trust;
 
 pub use cluster::{ClusterArgs, PilotArgs};
 pub use export::{ExportArgs, ExportFormat, ExportUnit};
-pub use new::{NewArgs, NewKind};
+pub use new::{NewArgs, NewKind, StudyProcess, StudyWords};
 pub use places::Places;
 pub use trust::TrustArgs;
 
@@ -72,7 +72,7 @@ pub enum Command {
         after_help = "Examples:\n  plyflow plugins\n  plyflow plugins forming-explicit\n  plyflow plugins --trust ./build/libmine.so"
     )]
     Plugins(PluginsArgs),
-    /// Begin a plugin of your own: a folder that builds, is checked and runs at once
+    /// Begin a study of a part, or a plugin of your own: a folder that runs at once
     #[command(after_help = new::NEW_EXAMPLES)]
     New(NewArgs),
     /// Keep the list of libraries, besides Plyflow's own, that you let it load

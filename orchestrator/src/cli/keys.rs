@@ -88,7 +88,9 @@ impl Writer<'_> {
             return plain(one);
         }
         if let Some(dimension) = value.get("x-dimension").as_str() {
-            return dimension.replace('_', " ");
+            let words = value.list("x-words").iter().map(plain);
+            let all = words.chain([dimension.replace('_', " ")]);
+            return all.collect::<Vec<_>>().join(" or ");
         }
         let one_of = value.list("oneOf");
         if !one_of.is_empty() {
@@ -206,19 +208,31 @@ impl Writer<'_> {
         self.named(schema, depth + 1, Some(key));
     }
 
+    /// Whether anything below a value has keys to be told; lists and alternatives are looked through.
+    fn has_keys(&self, value: &Resolved, depth: usize) -> bool {
+        let own = |v: &Resolved| {
+            v.get("properties").is_object() || v.get("additionalProperties").is_object()
+        };
+        if own(value) || depth > 4 {
+            return true;
+        }
+        let items = value.get("items");
+        let items = items.is_object().then_some(items);
+        let below = value
+            .list("oneOf")
+            .iter()
+            .chain(value.list("anyOf"))
+            .chain(items);
+        below
+            .map(|one| self.resolve(one))
+            .any(|one| self.has_keys(&one, depth + 1))
+    }
+
     /// The keys of a definition, the first time; later where they stand.
     fn named(&mut self, schema: &Value, depth: usize, key: Option<&str>) {
         let value = self.resolve(schema);
         if let Some(name) = &value.name {
-            let has_keys = ["properties", "oneOf", "anyOf", "additionalProperties"]
-                .iter()
-                .any(|k| {
-                    let of = value.get(k);
-                    of.is_object()
-                        || of
-                            .as_array()
-                            .is_some_and(|a| a.iter().any(|v| v.get("const").is_none()))
-                });
+            let has_keys = self.has_keys(&value, 0);
             if !has_keys {
                 return;
             }
@@ -284,6 +298,10 @@ mod tests {
             "  stl: mapping",
             "    unit: length, more than 0 mm, required",
             "    translate: [length, length, length], default [0 m, 0 m, 0 m]",
+            "    up: +x or -x or +y or -y or +z or -z or [number, number, number]",
+            "    rotate: angle or list of mapping",
+            "    centre: auto or [length, length]",
+            "    foot: auto or length",
             "sheets: list of mapping, required",
             "  kind: ply or diaphragm, required",
             "  fibre_2: angle",
@@ -295,6 +313,8 @@ mod tests {
         ] {
             assert!(text.lines().any(|l| l == line), "'{line}' in:\n{text}");
         }
+        // What has no keys points to none.
+        assert!(!text.contains("(keys as under `axis` above)"), "{text}");
         // The law of friction is told once.
         assert_eq!(text.matches("exponent:").count(), 1, "{text}");
         assert!(text.contains("(keys as under `"), "{text}");

@@ -1,15 +1,18 @@
-//! `new`: begins a plugin of one's own, from a template that the program carries.
+//! `new`: begins a study of a part, or a plugin of one's own, from a template that the program carries.
 
 mod name;
+mod study;
 mod template;
 
-use super::args::{NewArgs, NewKind, Places};
+use super::args::{Cli, Command, NewArgs, NewKind, Places, ValidateArgs};
 use super::open::{catalog, folders, store_root};
+use super::plan::validate;
 use super::shipped;
 use super::typed::quoted;
 use crate::exit;
 use crate::said::{Done, Stop, print, warn};
 use camino::{Utf8Path, Utf8PathBuf};
+use clap::Parser;
 use std::io::{BufRead, IsTerminal, Write};
 use template::Language;
 
@@ -20,7 +23,22 @@ use template::Language;
 /// are not to be found.
 pub fn new(args: &NewArgs) -> Done {
     let wrong = |text: String| Stop::new(exit::USAGE, text);
-    if let Some(text) = name::malformed(&args.name) {
+    let what = match args.kind {
+        NewKind::Study => "study",
+        _ => "plugin",
+    };
+    if let Some(text) = name::malformed(&args.name, what) {
+        return Err(wrong(text));
+    }
+    let folder = match &args.into {
+        Some(into) => into.join(&args.name),
+        None => Utf8PathBuf::from(&args.name),
+    };
+    if args.kind == NewKind::Study {
+        return new_study(args, &folder);
+    }
+    if let Some(option) = args.study.given() {
+        let text = format!("{option} is for a study: `plyflow new study {}`", args.name);
         return Err(wrong(text));
     }
     let language = {
@@ -39,10 +57,6 @@ pub fn new(args: &NewArgs) -> Done {
         Language::Rust => Some(shipped::crates(args.source.as_deref())?),
         _ => None,
     };
-    let folder = match &args.into {
-        Some(into) => into.join(&args.name),
-        None => Utf8PathBuf::from(&args.name),
-    };
     let files = template::filled(args.kind, language, &args.name, crates.as_deref());
     write(&folder, &files)?;
     let mut text = format!(
@@ -57,9 +71,48 @@ pub fn new(args: &NewArgs) -> Done {
     print(&(text + "\nIts README says what to change, and how it is used.\n"))
 }
 
+/// Writes a study and looks whether what was written is one.
+fn new_study(args: &NewArgs, folder: &Utf8Path) -> Done {
+    if args.python || args.rust || args.c {
+        let text = "--python, --rust and --c are for plugins: a study is written in YAML";
+        return Err(Stop::new(exit::USAGE, text));
+    }
+    refuse_what_is_there(folder)?;
+    let (files, told) = {
+        let mut answers = std::io::stdin().lock();
+        let terminal = answers.is_terminal() && std::io::stderr().is_terminal();
+        let answers = terminal.then_some(&mut answers as &mut dyn BufRead);
+        study::files(args, folder, answers)?
+    };
+    write(folder, &files)?;
+    // A workflow with a step in Python is valid where its packages are installed, which may come later.
+    let file = match args.study.dxf {
+        Some(_) => "scene.yaml",
+        None => "workflow.yaml",
+    };
+    validate(&typed_validate(&folder.join(file))?).map_err(|stop| {
+        let text = format!(
+            "{}{folder}: it was written, and has errors: correct them there",
+            stop.text
+        );
+        Stop::new(stop.code, text)
+    })?;
+    print(&told)
+}
+
+/// `validate` of a file, as it is typed, so that what it does by default stands in one place.
+fn typed_validate(file: &Utf8Path) -> Result<ValidateArgs, Stop> {
+    match Cli::try_parse_from(["plyflow", "validate", "--", file.as_str()]).map(|cli| cli.command) {
+        Ok(Command::Validate(args)) => Ok(args),
+        Ok(_) => Err(Stop::new(exit::INTERNAL, "`validate` is another command")),
+        Err(e) => Err(Stop::new(exit::INTERNAL, e)),
+    }
+}
+
 /// A kind, for people.
 fn title(kind: NewKind) -> &'static str {
     match kind {
+        NewKind::Study => "a study",
         NewKind::Step => "a step",
         NewKind::Element => "an element",
         NewKind::Material => "a material",
@@ -132,8 +185,8 @@ fn title_of(kind: &str) -> String {
     format!("{article} {kind}")
 }
 
-/// Writes the files into a folder that must be new or empty.
-fn write(folder: &Utf8Path, files: &[(Utf8PathBuf, String)]) -> Result<(), Stop> {
+/// Ends where there is something under the name of a folder that is to be made, unless it is an empty folder.
+fn refuse_what_is_there(folder: &Utf8Path) -> Result<(), Stop> {
     let is_new = match std::fs::read_dir(folder) {
         Ok(mut entries) => entries.next().is_none(),
         Err(_) => folder.symlink_metadata().is_err(),
@@ -144,6 +197,12 @@ fn write(folder: &Utf8Path, files: &[(Utf8PathBuf, String)]) -> Result<(), Stop>
         );
         return Err(Stop::new(exit::USAGE, text));
     }
+    Ok(())
+}
+
+/// Writes the files into a folder that must be new or empty.
+fn write(folder: &Utf8Path, files: &[(Utf8PathBuf, String)]) -> Result<(), Stop> {
+    refuse_what_is_there(folder)?;
     for (path, text) in files {
         let path = folder.join(path);
         let failed = || Stop::machine(format!("writing {path}"));

@@ -1,6 +1,7 @@
 //! Bars on a terminal: one per running step, one for the run.
 
 use super::pace::{Pace, duration_text, progress_text};
+use super::told::main_results;
 use crate::engine::core::{Core, Id, State};
 use crate::engine::{Observer, Update};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
@@ -126,8 +127,9 @@ impl Observer for Bars {
                 let shown = self.running.get(&id).is_some_and(|r| r.bar.is_some());
                 self.close(id);
                 if shown {
+                    let told = main_results(record);
                     let wall = duration_text(record.cost.wall_seconds);
-                    self.line(&format!("{:>16} done in {wall}", core.label(id)));
+                    self.line(&format!("{:>16} done in {wall}{told}", core.label(id)));
                 }
             }
             Update::Failed { reason, again } => {

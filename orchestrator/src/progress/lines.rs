@@ -1,6 +1,7 @@
 //! One line per event, for files and pipes.
 
 use super::pace::{Pace, duration_text, progress_text};
+use super::told::main_results;
 use crate::engine::core::{Core, Id};
 use crate::engine::{Observer, Update};
 use plyflow_model::job::{LogLevel, Progress};
@@ -72,7 +73,8 @@ impl Observer for Lines {
             Update::Finished(record) => {
                 self.running.remove(&id);
                 let wall = duration_text(record.cost.wall_seconds);
-                say(&format!("finish   {} in {wall}", core.label(id)));
+                let told = main_results(record);
+                say(&format!("finish   {} in {wall}{told}", core.label(id)));
             }
             Update::Failed { reason, again } => {
                 let next = if *again { " (trying again)" } else { "" };

@@ -4,6 +4,7 @@ mod bars;
 mod json;
 mod lines;
 mod pace;
+mod told;
 
 pub use bars::Bars;
 pub use json::JsonLines;

@@ -5,10 +5,10 @@
 //! Understood: `$ref`, `type`, `properties`, `required`, `additionalProperties`, `items`, `minItems`,
 //! `maxItems`, `const`, `minimum`, `maximum`, `anyOf` (by type and keys of the value), `oneOf` (of constants, or
 //! of one-key mappings), and of ours `x-dimension`, `x-minimum`, `x-maximum`, `x-exclusive-minimum`
-//! (quantities), `x-format: memory` and `x-expected` (what to say when no branch of an `anyOf` fits).
+//! (quantities), `x-words` (that may stand for one), `x-format: memory` and `x-expected` (what to say when no branch of an `anyOf` fits).
 
 use crate::diagnostics::{Diagnostic, Problems, Source};
-use crate::hints::{list_help, mapping_help, number_help};
+use crate::hints::{has_words, list_help, mapping_help, number_help, or_words};
 use crate::yaml::{Kind, Node, Span};
 use plyflow_model::manifest::one_of;
 use plyflow_model::units::{Dimension, parse_quantity};
@@ -127,13 +127,28 @@ impl<'a> Checker<'a> {
     }
 
     fn value(&mut self, node: &Node, schema: &View<'a>, what: &str, key: &Span) {
-        if let Some(expected) = schema.text("x-expected")
+        // Of what may be left out it stands on the branch.
+        let branches = schema.get("anyOf").and_then(Value::as_array);
+        let of_branch = |b: &'a Value| View(self.follow(b)).text("x-expected");
+        let inner = branches.filter(|b| b.iter().any(|b| b["type"] == "null"));
+        let inner = inner.and_then(|b| b.iter().find_map(of_branch));
+        if let Some(expected) = schema.text("x-expected").or(inner)
             && !self.fits_a_branch(schema, node)
         {
             return self.wrong_type(node, what, expected, key, None);
         }
         let schema = &self.choose(schema.clone(), node);
         if let Some(dimension) = schema.text("x-dimension") {
+            let words = schema.get("x-words").and_then(Value::as_array);
+            if let (Some(words), Some(text)) = (words, node.text()) {
+                if words.iter().any(|w| w == text) {
+                    return;
+                }
+                if text.starts_with(|c: char| c.is_ascii_alphabetic()) {
+                    let expected = format!("{} or a {dimension} with its unit", or_words(words));
+                    return self.wrong_type(node, what, &expected, key, None);
+                }
+            }
             self.quantity(node, schema, dimension, what, key);
         } else if schema.text("x-format") == Some("memory") {
             self.memory(node, what, key);
@@ -572,7 +587,8 @@ fn type_fits(schema: &View<'_>, node: &Node) -> bool {
         Kind::Null => schema.takes("null"),
         Kind::Bool(_) => schema.takes("boolean"),
         Kind::Number(_) => schema.takes("number") || schema.takes("integer"),
-        Kind::Text(_) => schema.takes("string"),
+        // Of a list of words none has a type beside it.
+        Kind::Text(_) => schema.takes("string") || schema.get("oneOf").is_some_and(has_words),
         Kind::List(_) => schema.takes("array"),
         Kind::Map(_) => schema.takes("object") || schema.get("oneOf").is_some(),
     }

@@ -3,6 +3,7 @@
 use crate::diagnostics::{Problems, Source};
 use crate::yaml::{Kind, Node};
 use plyflow_model::units::plain_number;
+use serde_json::Value;
 
 /// What to write in the place of a value that is no number, if that can be told.
 pub fn number_help(node: &Node, whole: bool) -> Option<String> {
@@ -112,4 +113,18 @@ pub fn other_format(
         d.help(*help);
     }
     true
+}
+/// Words that may stand for a quantity, for messages.
+pub fn or_words(words: &[Value]) -> String {
+    let words = words.iter().filter_map(Value::as_str);
+    words
+        .map(|w| format!("`{w}`"))
+        .collect::<Vec<_>>()
+        .join(" or ")
+}
+
+/// Whether one of the variants of a `oneOf` is a word.
+pub fn has_words(variants: &Value) -> bool {
+    let all = variants.as_array();
+    all.is_some_and(|v| v.iter().any(|v| v["const"].is_string()))
 }

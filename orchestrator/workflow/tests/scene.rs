@@ -212,6 +212,87 @@ fn an_stl_without_its_unit_is_told_the_form() {
 }
 
 #[test]
+fn words_that_place_a_tool_are_read_in_all_their_forms_and_wrong_ones_are_told_what_fits() {
+    let study = Study::sound();
+    study.write("spar.stl", "solid\nendsolid\n");
+    let spar = common::SCENE.find("tool:").unwrap()..common::SCENE.find("sheets:").unwrap();
+    let with = |words: &str| {
+        let mut text = common::SCENE.to_owned();
+        let tool = format!("tool: {{stl: {{file: spar.stl, unit: 1 mm, {words}}}}}\n");
+        text.replace_range(spar.clone(), &tool);
+        study.write(S, &text);
+        study
+            .load()
+            .err()
+            .map(|d| d.to_string())
+            .unwrap_or_default()
+    };
+    for sound in [
+        "up: +y",
+        "up: [0, 0.5, 1]",
+        "rotate: -30 deg",
+        "rotate: [{axis: -x, angle: 90 deg}, {axis: [1, 1, 0], angle: 0.1 rad}]",
+        "centre: auto",
+        "centre: [1 mm, -2 mm]",
+        "foot: auto",
+        "foot: 5 mm",
+        "translate: [1 m, 0 m, 0 m], up: -z, rotate: 90 deg, centre: auto, foot: auto",
+    ] {
+        assert_eq!(with(sound), "", "{sound}");
+    }
+    for (wrong, says) in [
+        ("up: y", &["`up` is `y`", "did you mean `+y`?"][..]),
+        (
+            "up: 3",
+            &["`up` is the number 3", "an axis such as `+y`, or a vector"],
+        ),
+        (
+            "up: [0, 0, 0]",
+            &["the vector has no length", "such as `+y`"],
+        ),
+        ("up: [0, 1]", &["`up` has 2 items", "3 items"]),
+        (
+            "rotate: 90",
+            &[
+                "`rotate` is the number 90",
+                "an angle about z such as `90 deg`",
+            ],
+        ),
+        (
+            "rotate: [{axis: +z}]",
+            &["`angle` is missing in `rotate[0]`"],
+        ),
+        (
+            "rotate: [{axis: z, angle: 1 deg}]",
+            &["`axis` is `z`", "did you mean `+z`?"],
+        ),
+        (
+            "rotate: [{axis: [0, 0, 0], angle: 1 deg}]",
+            &["the vector has no length"],
+        ),
+        ("centre: mid", &["`centre` is `mid`", "`auto`"]),
+        (
+            "centre: 3",
+            &[
+                "`centre` is the number 3",
+                "`auto`, or a place of the scene",
+            ],
+        ),
+        (
+            "foot: atuo",
+            &["`foot` is `atuo`", "`auto` or a length with its unit"],
+        ),
+        ("foot: 5", &["`5` has no unit", "`5 mm`"]),
+        ("foot: 5 kg", &["`foot`", "a length such as"]),
+    ] {
+        let told = with(wrong);
+        for part in says {
+            assert!(told.contains(part), "{wrong}: {part} in {told}");
+        }
+    }
+}
+
+#[test]
 fn a_gap_of_the_holder_and_an_opening_of_the_die_are_held_against_the_plies() {
     let with = |die: &str, gap: &str| {
         let text = scene(&[("a", "ply"), ("b", "ply")], "", "press");

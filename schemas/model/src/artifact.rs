@@ -49,7 +49,7 @@ pub use defects::{Defects, PlyDefects, Thresholds};
 pub use export::Export;
 pub use forming::{
     Depth, DepthPeak, Energy, FieldError, Forming, MeshQuality, POOR_JACOBIAN, Penetration,
-    PenetrationPeak, PlainBody, RegionFacts, RigidBody, Sheet, SheetBody,
+    PenetrationPeak, PlainBody, RegionFacts, RigidBody, Sheet, SheetBody, ToolPlacement,
 };
 pub use geometry::Geometry;
 pub use measurement::{

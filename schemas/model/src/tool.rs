@@ -1,11 +1,15 @@
 //! The rigid tool of a scene, in its words. What a parametric one must be to have a surface is told by [`rules`]; [`shape`] is that of
 //! the swept ones.
 
+pub mod place;
+pub mod placed;
 pub mod ramp;
 pub mod rules;
 pub mod shape;
 pub mod spar;
+pub mod stand;
 
+use crate::tool::place::{Centre, Direction, Foot, Place, Rotation};
 use crate::units::{Angle, Length};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -214,9 +218,34 @@ pub struct StlTool {
     /// Length of one unit of the file, e.g. `1 mm`.
     #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
     pub unit: Length,
-    /// Moves the file's origin, after scaling.
+    /// Moves the file's origin, after scaling and before anything else.
     #[serde(default)]
     pub translate: [Length; 3],
+    /// Which direction of the file becomes z, by the smallest turn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub up: Option<Direction>,
+    /// Turns it then, about z or one after the other about axes of the scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotate: Option<Rotation>,
+    /// Moves the middle of the box around it to x = y = 0, or to another place of the scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub centre: Option<Centre>,
+    /// Moves its lowest point to the bed, or to another height.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub foot: Option<Foot>,
+}
+
+impl StlTool {
+    /// Where its words put it.
+    pub fn place(&self) -> Place {
+        Place {
+            translate: self.translate.map(|t| t.si()),
+            up: self.up,
+            rotate: self.rotate.clone(),
+            centre: self.centre,
+            foot: self.foot,
+        }
+    }
 }
 
 /// A tool that another step makes: a body of an artifact at the input `geometry`.
@@ -225,12 +254,37 @@ pub struct StlTool {
 pub struct InputTool {
     /// Name of the body.
     pub body: String,
-    /// Moves the body.
+    /// Moves the body, before anything else.
     #[serde(default)]
     pub translate: [Length; 3],
+    /// Which direction of the body becomes z, by the smallest turn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub up: Option<Direction>,
+    /// Turns it then, about z or one after the other about axes of the scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotate: Option<Rotation>,
+    /// Moves the middle of the box around it to x = y = 0, or to another place of the scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub centre: Option<Centre>,
+    /// Moves its lowest point to the bed, or to another height.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub foot: Option<Foot>,
     /// Its triangles, once they have been read ([`crate::given::fill`]). They are no words of the scene.
     #[serde(skip)]
     pub given: Option<Arc<GivenSurface>>,
+}
+
+impl InputTool {
+    /// Where its words put it.
+    pub fn place(&self) -> Place {
+        Place {
+            translate: self.translate.map(|t| t.si()),
+            up: self.up,
+            rotate: self.rotate.clone(),
+            centre: self.centre,
+            foot: self.foot,
+        }
+    }
 }
 
 /// Triangles that a step has made.

@@ -8,8 +8,8 @@ const MOST: usize = 64;
 /// What a name has to be, for messages.
 const EXPECTED: &str = "expected small letters and digits, with single hyphens between words, beginning with a letter, such as `count-sheared`";
 
-/// Why a text is no name of a plugin; `None`: it is one.
-pub fn malformed(name: &str) -> Option<String> {
+/// Why a text is no name of `what`, a plugin or a study; `None`: it is one.
+pub fn malformed(name: &str, what: &str) -> Option<String> {
     if name.len() > MOST {
         return Some(format!(
             "the name has {} letters; expected at most {MOST}",
@@ -25,7 +25,7 @@ pub fn malformed(name: &str) -> Option<String> {
         false => String::new(),
     };
     Some(format!(
-        "`{name}` is no name of a plugin: {EXPECTED}{meant}"
+        "`{name}` is no name of a {what}: {EXPECTED}{meant}"
     ))
 }
 
@@ -110,7 +110,7 @@ mod tests {
     #[test]
     fn a_name_is_small_words_with_hyphens_and_another_one_is_told_how_it_would_be_right() {
         for name in ["a", "m4x", "count-sheared", "x2-3d"] {
-            assert_eq!(malformed(name), None, "{name}");
+            assert_eq!(malformed(name, "plugin"), None, "{name}");
         }
         for (name, nearest) in [
             ("CountSheared", Some("count-sheared")),
@@ -124,7 +124,7 @@ mod tests {
             ("", None),
             ("größe", Some("gr-e")),
         ] {
-            let text = malformed(name).expect(name);
+            let text = malformed(name, "plugin").expect(name);
             assert!(text.contains("such as `count-sheared`"), "{text}");
             let told = text
                 .split_once("beginning with a letter, such as `count-sheared`")
@@ -133,8 +133,8 @@ mod tests {
             let expected = nearest.map_or(String::new(), |n| format!("; `{n}` is such a name"));
             assert_eq!(told, expected, "{name}");
         }
-        assert_eq!(malformed(&"a".repeat(64)), None);
-        let text = malformed(&"a".repeat(65)).unwrap();
+        assert_eq!(malformed(&"a".repeat(64), "plugin"), None);
+        let text = malformed(&"a".repeat(65), "study").unwrap();
         assert!(text.contains("65 letters"), "{text}");
     }
 

@@ -50,6 +50,7 @@ impl Language {
 
 fn kind_word(kind: NewKind) -> &'static str {
     match kind {
+        NewKind::Study => "study",
         NewKind::Step => "step",
         NewKind::Element => "element",
         NewKind::Material => "material",
@@ -59,6 +60,8 @@ fn kind_word(kind: NewKind) -> &'static str {
 /// The name that stands in the templates of a kind.
 fn placeholder(kind: NewKind) -> &'static str {
     match kind {
+        // There is no template of one: it is put together (`super::study`).
+        NewKind::Study => "study",
         NewKind::Step => "double-time",
         NewKind::Element => "my-membrane",
         NewKind::Material => "my-sheet",

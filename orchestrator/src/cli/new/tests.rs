@@ -1,4 +1,5 @@
 use super::*;
+use crate::cli::args::StudyWords;
 
 fn args(kind: NewKind, flags: [bool; 3]) -> NewArgs {
     NewArgs {
@@ -9,6 +10,7 @@ fn args(kind: NewKind, flags: [bool; 3]) -> NewArgs {
         c: flags[2],
         into: None,
         source: None,
+        study: StudyWords::default(),
     }
 }
 

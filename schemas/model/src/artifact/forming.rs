@@ -70,9 +70,21 @@ pub struct Forming {
     /// Share of the thinner sheet up to which depths are not told.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_bound: Option<f64>,
+    /// Of a tool whose scene has put it in its place by more than `translate`: how.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tool_placement: Option<ToolPlacement>,
     /// What the user should know.
     #[serde(default)]
     pub warnings: Vec<String>,
+}
+
+/// Where a tool's file, or a body of another step, lies in the scene.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ToolPlacement {
+    /// By rows: takes (x, y, z, 1) of the file (m) to the scene (m). It turns and moves, and its inverse brings results back.
+    pub matrix: [[f64; 4]; 4],
+    /// Length of one unit of the file (m).
+    pub unit: f64,
 }
 
 impl Attributes for Forming {

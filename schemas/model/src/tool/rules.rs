@@ -21,8 +21,10 @@ pub fn check(tool: &Tool) -> Result<(), Fault> {
         Tool::Hemisphere(t) => hemisphere(t, &at),
         Tool::DoubleDome(t) => double_dome(t, &at),
         Tool::Tetrahedron(t) => tetrahedron(t, &at),
-        Tool::Stl(stl) => positive(at.key("unit"), stl.unit.si()),
-        Tool::Input(_) => Ok(()),
+        Tool::Stl(stl) => {
+            positive(at.key("unit"), stl.unit.si()).and_then(|()| stl.place().check(&at))
+        }
+        Tool::Input(input) => input.place().check(&at),
     }?;
     few_facets(tool, &at)
 }

@@ -4,6 +4,7 @@ use crate::chord::CHORD_TOLERANCE;
 use crate::error::ToolError;
 use crate::mesh::ToolMesh;
 use crate::{double_dome, hemisphere, input, stl, sweep, tetrahedron};
+use plyflow_model::artifact::ToolPlacement;
 use plyflow_model::scene::Tool;
 use plyflow_model::tool::rules;
 use std::path::Path;
@@ -17,13 +18,34 @@ pub fn build(tool: &Tool) -> Result<ToolMesh, ToolError> {
     build_from(tool, Path::new(""))
 }
 
+/// A tool's surface, and how it has been put in its place.
+pub struct Built {
+    /// The surface.
+    pub mesh: ToolMesh,
+    /// Of a tool that its words put in its place by more than `translate`.
+    pub placement: Option<ToolPlacement>,
+}
+
+/// As [`build`], with how the tool has been put in its place.
+///
+/// # Errors
+/// As [`build`].
+pub fn built(tool: &Tool) -> Result<Built, ToolError> {
+    built_from(tool, Path::new(""))
+}
+
 /// As [`build`], with STL paths relative to `folder`, the one that holds the scene file.
 ///
 /// # Errors
 /// As [`build`].
 pub fn build_from(tool: &Tool, folder: &Path) -> Result<ToolMesh, ToolError> {
+    built_from(tool, folder).map(|built| built.mesh)
+}
+
+fn built_from(tool: &Tool, folder: &Path) -> Result<Built, ToolError> {
     rules::check(tool)?;
-    Ok(match tool {
+    let mut placement = None;
+    let mesh = match tool {
         Tool::JoggleSpar(t) => sweep::mesh(&t.shape()?, t.facet_size.si(), CHORD_TOLERANCE),
         Tool::Flat(t) => sweep::mesh(&t.shape()?, t.facet_size.si(), CHORD_TOLERANCE),
         Tool::RampedSpar(t) => sweep::mesh(&t.shape()?, t.facet_size.si(), CHORD_TOLERANCE),
@@ -32,10 +54,17 @@ pub fn build_from(tool: &Tool, folder: &Path) -> Result<ToolMesh, ToolError> {
         Tool::Hemisphere(t) => hemisphere::hemisphere(t.radius.si(), t.facet_size.si()),
         Tool::Stl(s) => {
             let path = folder.join(&s.file);
-            stl::read(&path, s.unit.si(), s.translate.map(|t| t.si()))?
+            let (mesh, placed) = stl::read(&path, s.unit.si(), &s.place())?;
+            placement = placed.told();
+            mesh
         }
-        Tool::Input(t) => input::read(t)?,
-    })
+        Tool::Input(t) => {
+            let (mesh, placed) = input::read(t)?;
+            placement = placed.told();
+            mesh
+        }
+    };
+    Ok(Built { mesh, placement })
 }
 
 #[cfg(test)]

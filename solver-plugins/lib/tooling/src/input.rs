@@ -3,10 +3,12 @@
 use crate::error::ToolError;
 use crate::mesh::ToolMesh;
 use crate::surface::{self, NoSurface, Origin};
+use plyflow_geometry::vec3::Vec3;
+use plyflow_model::tool::placed::Placed;
 use plyflow_model::tool::{GivenSurface, InputTool};
 
 /// Makes the triangles of a step a tool ([`surface::surface`]).
-pub(crate) fn read(tool: &InputTool) -> Result<ToolMesh, ToolError> {
+pub(crate) fn read(tool: &InputTool) -> Result<(ToolMesh, Placed), ToolError> {
     let Some(given) = &tool.given else {
         return Err(ToolError::NotRead(tool.body.clone()));
     };
@@ -16,15 +18,23 @@ pub(crate) fn read(tool: &InputTool) -> Result<ToolMesh, ToolError> {
         problem,
         remedy: remedy.to_owned(),
     };
+    let mut corners = corners(given).map_err(error)?;
+    let placed = surface::put(&mut corners, 1.0, &tool.place()).map_err(error)?;
     let origin = Origin {
-        unit: 1.0,
-        units: "in m, before `translate`",
-        translate: tool.translate.map(|t| t.si()),
+        placed,
+        units: match tool.place().only_moves() {
+            true => "in m, before `translate`",
+            false => "in m, before it is placed",
+        },
         place: &|triangle| format!("triangle {triangle}, counted from 0"),
     };
-    let mut corners = corners(given).map_err(error)?;
-    surface::placed(&mut corners, &origin).map_err(error)?;
-    surface::surface(&corners, &origin).map_err(error)
+    let mesh = surface::surface(&corners, &origin).map_err(error)?;
+    Ok((mesh, placed))
+}
+
+/// The corners of all triangles of a step (m), where it has been read and they are there.
+pub(crate) fn facets(tool: &InputTool) -> Option<Vec<[Vec3; 3]>> {
+    corners(tool.given.as_ref()?).ok()
 }
 
 /// The corners of all triangles (m).

@@ -7,8 +7,10 @@
 // What reaches an artifact has the same bits on every machine (`plyflow_fixed`).
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
+mod advise;
 mod audit;
 mod build;
+mod checks;
 mod chord;
 mod double_dome;
 mod error;
@@ -26,8 +28,9 @@ mod sweep;
 mod tetrahedron;
 mod tree;
 
+pub use advise::other_way_up;
 pub use audit::FieldError;
-pub use build::{build, build_from};
+pub use build::{Built, build, build_from, built};
 pub use chord::CHORD_TOLERANCE;
 pub use error::ToolError;
 pub use given::RigidTool;

@@ -6,30 +6,40 @@ use crate::surface::{self, NoSurface, Origin};
 use plyflow_files::open::{self, MOST_DATA};
 use plyflow_files::stl;
 use plyflow_geometry::vec3::Vec3;
+use plyflow_model::tool::place::Place;
+use plyflow_model::tool::placed::Placed;
 use std::path::Path;
 
-/// Reads a file ([`plyflow_files::stl`]) and makes its facets a tool ([`surface::surface`]).
-pub(crate) fn read(path: &Path, unit: f64, translate: Vec3) -> Result<ToolMesh, ToolError> {
+/// Reads a file ([`plyflow_files::stl`]) and makes its facets a tool ([`surface::surface`]), put where `place` says.
+pub(crate) fn read(path: &Path, unit: f64, place: &Place) -> Result<(ToolMesh, Placed), ToolError> {
     let surface_error = |(problem, remedy): NoSurface| ToolError::Surface {
         path: path.to_owned(),
         problem,
         remedy: remedy.to_owned(),
     };
+    let mut read = parsed(path)?;
+    let mut corners = std::mem::take(&mut read.corners);
+    let placed = surface::put(&mut corners, unit, place).map_err(surface_error)?;
+    let origin = Origin {
+        placed,
+        units: "in the file's units",
+        place: &|facet| read.place(facet),
+    };
+    let mesh = surface::surface(&corners, &origin).map_err(surface_error)?;
+    Ok((mesh, placed))
+}
+
+/// The facets of a file, in its units.
+pub(crate) fn facets(path: &str) -> Result<Vec<[Vec3; 3]>, ToolError> {
+    parsed(Path::new(path)).map(|read| read.corners)
+}
+
+fn parsed(path: &Path) -> Result<stl::Facets, ToolError> {
     let bytes = open::read(path, MOST_DATA).map_err(|source| ToolError::Read {
         path: path.to_owned(),
         source,
     })?;
-    let mut read = stl::parse(&bytes).map_err(|e| ToolError::Stl(e.of(path)))?;
-    drop(bytes);
-    let mut corners = std::mem::take(&mut read.corners);
-    let origin = Origin {
-        unit,
-        units: "in the file's units",
-        translate,
-        place: &|facet| read.place(facet),
-    };
-    surface::placed(&mut corners, &origin).map_err(surface_error)?;
-    surface::surface(&corners, &origin).map_err(surface_error)
+    stl::parse(&bytes).map_err(|e| ToolError::Stl(e.of(path)))
 }
 
 #[cfg(test)]
@@ -38,7 +48,15 @@ mod tests {
     use crate::hemisphere::hemisphere;
     use std::io::Write;
 
-    fn facets(mesh: &ToolMesh) -> Vec<[Vec3; 3]> {
+    fn read(path: &Path, unit: f64, translate: Vec3) -> Result<ToolMesh, ToolError> {
+        let place = Place {
+            translate,
+            ..Place::default()
+        };
+        super::read(path, unit, &place).map(|(mesh, _)| mesh)
+    }
+
+    fn in_mm(mesh: &ToolMesh) -> Vec<[Vec3; 3]> {
         let all = 0..mesh.triangles.len();
         all.map(|t| mesh.corners(t).map(|p| p.map(|c| 1e3 * c)))
             .collect()
@@ -46,14 +64,14 @@ mod tests {
 
     fn binary(mesh: &ToolMesh) -> tempfile::NamedTempFile {
         let mut file = tempfile::NamedTempFile::new().unwrap();
-        file.write_all(&stl::write(&facets(mesh))).unwrap();
+        file.write_all(&stl::write(&in_mm(mesh))).unwrap();
         file
     }
 
     fn ascii(mesh: &ToolMesh) -> tempfile::NamedTempFile {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         writeln!(file, "solid tool").unwrap();
-        for t in facets(mesh) {
+        for t in in_mm(mesh) {
             writeln!(file, "facet normal 0 0 0\nouter loop").unwrap();
             for v in t {
                 writeln!(file, "vertex {} {} {}", v[0], v[1], v[2]).unwrap();

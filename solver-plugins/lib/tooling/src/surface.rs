@@ -3,6 +3,8 @@
 use crate::facets;
 use crate::mesh::{Adjacency, ToolMesh};
 use plyflow_geometry::vec3::{Vec3, dot, sub};
+use plyflow_model::tool::place::Place;
+use plyflow_model::tool::placed::Placed;
 
 /// How far above its lowest point, over its height, a tool may be open.
 const FOOT: f64 = 1e-3;
@@ -12,33 +14,42 @@ pub(crate) type NoSurface = (String, &'static str);
 
 /// How a place of a tool is told to who made its facets.
 pub(crate) struct Origin<'a> {
-    /// One of their units (m).
-    pub unit: f64,
+    /// Where they have been put.
+    pub placed: Placed,
     /// What the units are, as in `in the file's units`.
     pub units: &'a str,
-    /// By how much the facets have been moved (m).
-    pub translate: Vec3,
     /// Which facet it is, by its number from 0.
     pub place: &'a dyn Fn(usize) -> String,
 }
 
-/// Puts facets where the tool is (m): scales and then moves them, as their origin says.
+/// Puts facets, in units of `unit` (m), where the tool is (m), and tells how.
 ///
 /// # Errors
 /// When a coordinate is too large for that.
-pub(crate) fn placed(corners: &mut [[Vec3; 3]], origin: &Origin<'_>) -> Result<(), NoSurface> {
+pub(crate) fn put(
+    corners: &mut [[Vec3; 3]],
+    unit: f64,
+    place: &Place,
+) -> Result<Placed, NoSurface> {
+    let too_large = || {
+        (
+            "it has a coordinate that is too large".to_owned(),
+            "export it again",
+        )
+    };
+    let placed = match corners.is_empty() {
+        true => Placed::moved(unit, place.translate),
+        false => Placed::of(place, unit, corners.as_flattened().iter()).ok_or_else(too_large)?,
+    };
     for facet in corners {
         for p in facet.iter_mut() {
-            *p = std::array::from_fn(|k| p[k] * origin.unit + origin.translate[k]);
+            *p = placed.put(*p);
         }
         if facet.as_flattened().iter().any(|c| !c.is_finite()) {
-            return Err((
-                "it has a coordinate that is too large".to_owned(),
-                "export it again",
-            ));
+            return Err(too_large());
         }
     }
-    Ok(())
+    Ok(placed)
 }
 
 /// Joins facets ([`facets::join`]; m) and checks that they are a surface with a consistent outside, open at its foot at most.
@@ -77,10 +88,7 @@ struct Checked<'a> {
 impl Checked<'_> {
     /// A point in the units of who made the facets.
     fn point(&self, p: Vec3) -> String {
-        let Origin {
-            unit, translate, ..
-        } = self.origin;
-        let q: Vec3 = std::array::from_fn(|k| (p[k] - translate[k]) / unit);
+        let q = self.origin.placed.back(p);
         format!("({:.4}, {:.4}, {:.4})", q[0], q[1], q[2])
     }
 

@@ -10,7 +10,7 @@ use plyflow_mechanics::backend::{Backend, Load as _, Stretch};
 use plyflow_mechanics::component::ElementField;
 use plyflow_mechanics::contact::RigidContact;
 use plyflow_mechanics::model::{Clock, Model};
-use plyflow_model::artifact::Zone;
+use plyflow_model::artifact::{ToolPlacement, Zone};
 use plyflow_tooling::{FieldError, ToolMesh};
 use std::sync::Arc;
 
@@ -33,6 +33,8 @@ pub struct Forming {
     /// By rigid part: by how much (m) and where what contacts see differs most from the triangles that are
     /// written of it.
     pub field_errors: Vec<(RigidName, FieldError)>,
+    /// How the tool has been put in its place, by more than `translate`.
+    pub placement: Option<ToolPlacement>,
     /// What the user should know of the tool.
     pub tool_warnings: Vec<String>,
     /// The zone of a local run.

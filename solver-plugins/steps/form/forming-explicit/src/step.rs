@@ -15,7 +15,7 @@ use crate::stack::{Body, Components};
 use plyflow_abi::{PF_KIND_ELEMENT, PF_KIND_MATERIAL, pf_component};
 use plyflow_mechanics::team;
 use plyflow_sdk::{Host, Log, Progress};
-use plyflow_tooling::of_step;
+use plyflow_tooling::{given, of_step};
 
 struct HostComponents<'a>(&'a Host);
 
@@ -69,6 +69,9 @@ fn build(host: &Host, p: &Parameters) -> Result<Forming> {
     };
     if let Some(what) = slower_multipliers(&forming, p) {
         host.log(Log::Info, &what);
+    }
+    if let Some(placement) = &forming.placement {
+        host.log(Log::Info, &given::placement_told(placement));
     }
     for what in at_the_start(&forming) {
         host.log(Log::Warn, &what);

@@ -6,11 +6,13 @@ use crate::root::drop_on;
 use crate::surface::SmoothSurface;
 use plyflow_geometry::vec3::{Vec3, distance};
 use plyflow_mechanics::mesh::QuadMesh;
-use plyflow_model::artifact::{FieldError, Forming, MeshQuality, RigidBody, Sheet, SheetBody};
+use plyflow_model::artifact::{
+    FieldError, Forming, MeshQuality, RigidBody, Sheet, SheetBody, ToolPlacement,
+};
 use plyflow_model::budget::{self, Wanted};
 use plyflow_model::scene::{Process, Scene};
 use plyflow_sdk::{Host, Log, On, Progress, StepError};
-use plyflow_tooling::{ToolMesh, given, of_step};
+use plyflow_tooling::{Built, ToolMesh, given, of_step, other_way_up};
 use serde::Deserialize;
 use std::time::Instant;
 
@@ -53,7 +55,13 @@ pub(crate) fn run(host: &Host) -> Result<(), StepError> {
     report(host, 0.0, "reading the tool");
     of_step::read(host, &mut p.scene)?;
     let plies = plies(&p.scene)?;
-    let tool = given::checked(&p.scene, p.tool_grid)?;
+    let Built {
+        mesh: tool,
+        placement,
+    } = given::checked(&p.scene, p.tool_grid)?;
+    if let Some(placement) = &placement {
+        host.log(Log::Info, &given::placement_told(placement));
+    }
     let surface = SmoothSurface::new(&tool, p.crease_angle)
         .ok_or("the tool has no facet with an area: give another one")?;
     let started = Instant::now();
@@ -76,22 +84,27 @@ pub(crate) fn run(host: &Host) -> Result<(), StepError> {
     report(host, 0.95, "writing");
     write_bodies(host, &p.scene, &tool, &done)?;
     let (off, at) = surface.smoothed_by();
-    let mut of_tool = Vec::from_iter(given::unlike_sizes(&p.scene, &tool));
-    of_tool.extend(much_smoothed(&p, (off, at)));
+    let mut texts = Vec::from_iter(given::unlike_sizes(&p.scene, &tool));
+    texts.extend(other_way_up(&p.scene, &tool));
+    texts.extend(much_smoothed(&p, (off, at)));
     host.result("tool_field_error", off, "m")?;
-    write_summary(
-        host,
-        &p,
-        &done,
-        (
-            of_tool,
-            FieldError {
-                max: off,
-                place: at,
-            },
-        ),
-        seconds,
-    )
+    let of_tool = OfTool {
+        texts,
+        field_error: FieldError {
+            max: off,
+            place: at,
+        },
+        placement,
+    };
+    write_summary(host, &p, &done, of_tool, seconds)
+}
+
+/// What is told of the tool.
+struct OfTool {
+    /// What the user should know.
+    texts: Vec<String>,
+    field_error: FieldError,
+    placement: Option<ToolPlacement>,
 }
 
 /// What to say of a tool whose facets the net does not lie on.
@@ -368,13 +381,7 @@ fn warnings(p: &Parameters, d: &Done, unreached: usize) -> Vec<String> {
 }
 
 /// What the artifact says of the drape.
-fn forming(
-    p: &Parameters,
-    done: &[Done],
-    elements: u64,
-    field_error: FieldError,
-    warnings: Vec<String>,
-) -> Forming {
+fn forming(p: &Parameters, done: &[Done], elements: u64, of_tool: OfTool) -> Forming {
     Forming {
         scene: Some(p.scene.name.clone()),
         sheets: done.iter().map(sheet).collect(),
@@ -392,10 +399,11 @@ fn forming(
         penetration: None,
         overlap_bound: None,
         overlap_peak_bound: None,
-        tool_field_error: [("tool".to_owned(), field_error)].into(),
+        tool_field_error: [("tool".to_owned(), of_tool.field_error)].into(),
         depth: None,
         depth_bound: None,
-        warnings,
+        tool_placement: of_tool.placement,
+        warnings: of_tool.texts,
     }
 }
 
@@ -403,7 +411,7 @@ fn write_summary(
     host: &Host,
     p: &Parameters,
     done: &[Done],
-    (mut texts, field_error): (Vec<String>, FieldError),
+    mut of_tool: OfTool,
     seconds: f64,
 ) -> Result<(), StepError> {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -423,7 +431,7 @@ fn write_summary(
         }
         unreachable += missed;
         elements += d.mesh.cells.len();
-        texts.extend(warnings(p, d, missed));
+        of_tool.texts.extend(warnings(p, d, missed));
     }
     if low > high {
         return Err(
@@ -431,10 +439,10 @@ fn write_summary(
                 .into(),
         );
     }
-    for w in &texts {
+    for w in &of_tool.texts {
         host.log(Log::Warn, w);
     }
-    host.write_attributes(&forming(p, done, elements as u64, field_error, texts))?;
+    host.write_attributes(&forming(p, done, elements as u64, of_tool))?;
     let strain = done.iter().map(|d| d.fibre_strain).fold(0.0, f64::max);
     let nodes = done.iter().map(|d| d.net_nodes).sum::<usize>() as f64;
     host.result("shear_max", high, "rad")?;

@@ -113,6 +113,129 @@ fn what_a_step_makes_is_draped_as_the_file_and_the_points_with_the_same_numbers(
     assert_eq!(by_step.log, by_file.log);
 }
 
+/// A block of 160 x 120 x 20 mm with rounded edges, its corners rounded to 1 nm: what decimals of a file say.
+fn rounded_block() -> ToolMesh {
+    let words = json!({"flat": {"length": "0.16 m", "width": "0.12 m", "height": "0.02 m", "fillet": "0.005 m", "facet_size": "0.01 m"}});
+    let mut mesh = plyflow_tooling::build(&serde_json::from_value(words).unwrap()).unwrap();
+    let points = mesh.points.iter_mut();
+    points.for_each(|p| *p = p.map(|c| (c * 1e9).round() / 1e9));
+    mesh
+}
+
+/// Writes a tool as text with all digits; `put` takes m to the units of the file.
+fn write_text(path: &std::path::Path, mesh: &ToolMesh, put: impl Fn([f64; 3]) -> [f64; 3]) {
+    let mut text = String::from("solid tool\n");
+    for t in 0..mesh.triangles.len() {
+        text += "facet normal 0 0 0\nouter loop\n";
+        for p in mesh.corners(t) {
+            let [x, y, z] = put(p);
+            text += &format!("vertex {x} {y} {z}\n");
+        }
+        text += "endloop\nendfacet\n";
+    }
+    std::fs::write(path, text + "endsolid tool\n").unwrap();
+}
+
+/// From m to inches of an aircraft: the tool's x is z there, its y is x, up is y, and the place is some 20 m off.
+fn to_aircraft([x, y, z]: [f64; 3]) -> [f64; 3] {
+    [y + 4.123, z - 1.5, x + 20.456].map(|c| c / 0.0254)
+}
+
+#[test]
+fn a_tool_in_aircraft_coordinates_and_inches_is_draped_as_the_one_in_its_place_to_the_bit() {
+    let block = rounded_block();
+    let folder = tempfile::tempdir().unwrap();
+    let [here, there] = ["here.stl", "there.stl"].map(|n| folder.path().join(n));
+    write_text(&here, &block, |p| p.map(|c| (c * 1e9).round() / 1e6));
+    write_text(&there, &block, to_aircraft);
+    let listed = json!([
+        ["-0.05 m", "-0.04 m"],
+        ["0.06 m", "-0.04 m"],
+        ["0.05 m", "0.04 m"],
+        ["-0.05 m", "0.03 m"]
+    ]);
+    let formed = |tool: Value| drape(scene(tool, listed.clone(), json!([])), &[]);
+    let stl = |file: &std::path::Path, words: Value| {
+        let mut all = words;
+        all["file"] = json!(file.to_str().unwrap());
+        json!({ "stl": all })
+    };
+    let own = formed(stl(&here, json!({"unit": "1 mm"}))).unwrap();
+    let words =
+        json!({"unit": "1 in", "up": "+y", "rotate": "90 deg", "centre": "auto", "foot": "auto"});
+    let placed = formed(stl(&there, words)).unwrap();
+    assert!(own.result("elements") > 50.0 && own.result("coverage") == 1.0);
+    assert_eq!(placed.bodies, own.bodies);
+    assert_eq!(placed.results, own.results);
+    assert!(own.attributes.get("tool_placement").is_none());
+
+    // The matrix takes the file, in m, to the scene.
+    let told = &placed.attributes["tool_placement"];
+    assert_eq!(told["unit"], json!(0.0254));
+    let matrix: [[f64; 4]; 4] = serde_json::from_value(told["matrix"].clone()).unwrap();
+    for p in &block.points {
+        let q = to_aircraft(*p).map(|c| c * 0.0254);
+        for k in 0..3 {
+            let [a, b, c, d] = matrix[k];
+            let found = a * q[0] + b * q[1] + c * q[2] + d;
+            assert!((found - p[k]).abs() < 2e-14, "{found} {}", p[k]);
+        }
+    }
+    assert!(
+        placed
+            .log
+            .iter()
+            .any(|l| format!("{l:?}").contains("put in its place by the matrix")),
+        "{:?}",
+        placed.log
+    );
+
+    // Not by quarters: the same to 1e-9 m.
+    let (sine, cosine) = 0.5236_f64.sin_cos();
+    let turned =
+        |[x, y, z]: [f64; 3]| [cosine * x - sine * y + 7.0, sine * x + cosine * y, z - 2.0];
+    write_text(&there, &block, turned);
+    let words = json!({"unit": "1 m", "rotate": "-0.5236 rad", "centre": "auto", "foot": "auto"});
+    let askew = formed(stl(&there, words)).unwrap();
+    for (one, other) in askew.bodies.iter().zip(&own.bodies) {
+        assert_eq!(one.cells, other.cells);
+        for (p, q) in one.points.iter().zip(&other.points) {
+            assert!((0..3).all(|k| (p[k] - q[k]).abs() < 1e-9), "{p:?} {q:?}");
+        }
+    }
+
+    // A body of a step takes the same words.
+    let body = MemoryBody {
+        name: "dome".into(),
+        points: block
+            .points
+            .iter()
+            .map(|p| to_aircraft(*p).map(|c| c * 0.0254))
+            .collect(),
+        nodes_per_cell: 3,
+        cells: block.triangles.as_flattened().to_vec(),
+        ..Default::default()
+    };
+    let given = MemoryArtifact {
+        kind: "geometry".into(),
+        attributes: json!({}),
+        bodies: vec![body],
+        ..Default::default()
+    };
+    let words = json!({"input": {"body": "dome", "up": "+y", "rotate": "90 deg", "centre": "auto", "foot": "auto"}});
+    let by_step = drape(scene(words, listed.clone(), json!([])), &[of_cad(&given)]).unwrap();
+    assert_eq!(by_step.bodies, own.bodies);
+    let as_given = json!({"input": {"body": "dome"}});
+    let told = refused(
+        scene(as_given, listed.clone(), json!([])),
+        &[of_cad(&given)],
+    );
+    assert!(
+        told.contains("`tool: {input: {body: dome, up: +y, centre: auto, foot: auto}}`"),
+        "{told}"
+    );
+}
+
 #[test]
 fn tool_and_outline_may_come_from_two_steps_and_a_name_from_one_alone() {
     let (mut tool, mut outline) = (made(), made());

@@ -76,6 +76,7 @@ pub fn build_bag(
         tool: tool.mesh,
         rigid: Vec::new(),
         field_errors: vec![(RigidName::Tool, tool.error)],
+        placement: tool.placement,
         tool_warnings: tool.warnings,
         zone: None,
         slower: 1.0,

@@ -78,6 +78,7 @@ pub fn build_press(p: &Parameters, press: &Press, components: &dyn Components) -
         tool: tool.mesh,
         rigid,
         field_errors,
+        placement: tool.placement,
         tool_warnings: tool.warnings,
         zone: None,
         slower: 1.0,

@@ -55,6 +55,7 @@ pub fn build_local(
         tool: tool.mesh,
         rigid: Vec::new(),
         field_errors: vec![(RigidName::Tool, tool.error)],
+        placement: tool.placement,
         tool_warnings: tool.warnings,
         zone: Some(input.zone),
         slower: input.slower,

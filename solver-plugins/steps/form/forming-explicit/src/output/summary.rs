@@ -122,6 +122,7 @@ fn attributes(
         tool_field_error: field_error_attributes(forming),
         depth: Some(depth_attributes(&outcome.depths)),
         depth_bound: Some(DEPTH_BOUND),
+        tool_placement: forming.placement,
         warnings: warnings(forming, outcome, penetrations),
     }
 }

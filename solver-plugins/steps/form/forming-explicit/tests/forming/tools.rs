@@ -306,12 +306,49 @@ mod stl {
 
     /// A ply pressed over a dome, or over what a file holds.
     fn over(file: Option<&Path>) -> (Forming, Outcome) {
+        let of_file = |file: &Path| json!({"stl": {"file": file, "unit": "1 mm", "translate": ORIGIN.map(|x| format!("{x} mm"))}});
+        over_tool(file.map(of_file))
+    }
+
+    /// A ply pressed over a dome, or over a tool of these words.
+    fn over_tool(tool: Option<Value>) -> (Forming, Outcome) {
         let mut p = gentle_press("m4", -std::f64::consts::FRAC_PI_4, &[]);
-        if let Some(file) = file {
-            let tool = json!({"stl": {"file": file, "unit": "1 mm", "translate": ORIGIN.map(|x| format!("{x} mm"))}});
+        if let Some(tool) = tool {
             p.scene.tool = serde_json::from_value(tool).unwrap();
         }
         form(&p, 1)
+    }
+
+    #[test]
+    fn a_dome_in_aircraft_coordinates_and_inches_forms_as_the_one_in_its_place_to_the_bit() {
+        let p = gentle_press("m4", -std::f64::consts::FRAC_PI_4, &[]);
+        let mut dome = plyflow_tooling::build(&p.scene.tool).unwrap();
+        let points = dome.points.iter_mut();
+        points.for_each(|q| *q = q.map(|c| (c * 1e9).round() / 1e9));
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, put: &dyn Fn([f64; 3]) -> [f64; 3]| {
+            let mut text = String::from("solid dome\n");
+            for t in 0..dome.triangles.len() {
+                text.push_str("facet normal 0 0 0\nouter loop\n");
+                for [x, y, z] in dome.corners(t).map(put) {
+                    writeln!(text, "vertex {x} {y} {z}").unwrap();
+                }
+                text.push_str("endloop\nendfacet\n");
+            }
+            let file = folder.path().join(name);
+            std::fs::write(&file, text + "endsolid dome\n").unwrap();
+            file
+        };
+        let here = write("here.stl", &|q| q.map(|c| (c * 1e9).round() / 1e6));
+        let there = write("there.stl", &|[x, y, z]| {
+            [y + 4.123, z - 1.5, x + 20.456].map(|c| c / 0.0254)
+        });
+        let (own, a) = over_tool(Some(json!({"stl": {"file": here, "unit": "1 mm"}})));
+        let (placed, b) = over_tool(Some(json!({"stl": {
+            "file": there, "unit": "1 in", "up": "+y", "rotate": "90 deg", "centre": "auto", "foot": "auto"}})));
+        assert!(a.cycles > 100 && a.cycles == b.cycles);
+        assert!(own.model.x() == placed.model.x() && own.model.v() == placed.model.v());
+        assert!(own.placement.is_none() && placed.placement.is_some());
     }
 
     #[test]
