@@ -28,12 +28,17 @@ pub fn judge(input: &ReportInput) -> Vec<Judged> {
         return of_run(input, limits);
     };
     let mut all = Vec::new();
+    // What all points share, without the instances of a thousand of them.
+    let shared = ReportInput {
+        instances: Vec::new(),
+        family: None,
+        ..input.clone()
+    };
     for point in &family.points {
         let instances = point.instances.iter();
         let own = ReportInput {
             instances: instances.map(|i| input.instances[*i].clone()).collect(),
-            family: None,
-            ..input.clone()
+            ..shared.clone()
         };
         let judged = match point.fate {
             Fate::Done => of_run(&own, limits),
