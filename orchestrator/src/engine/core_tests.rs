@@ -393,3 +393,50 @@ fn an_interrupt_cancels_what_runs_and_ends() {
     let p = play(forming(), &script);
     assert_eq!((p.order.len(), p.cancelled), (3, 1));
 }
+
+#[test]
+fn what_most_waits_for_gets_the_cores_where_they_are_few() {
+    // Names and threads of what is started first.
+    let first = |cores: u32| {
+        let mut steps = vec![
+            step("drape", &[], &[]),
+            step("shape", &[], &[]),
+            step("coarse", &[], &[]),
+            step("zones", &[], &[("in", "coarse")]),
+            step("local", &[], &[("in", "zones")]),
+        ];
+        for s in &mut steps {
+            s.resources.cores = 0;
+        }
+        let w = workflow(steps);
+        let graph = Graph::new(&w).unwrap();
+        let limits = Limits {
+            cores,
+            memory: 0,
+            policy: FailurePolicy::KeepGoing,
+        };
+        let mut core = Core::new(&graph, limits);
+        let mut found = vec![];
+        for effect in core.start() {
+            let Effect::Look(id) = effect else {
+                panic!("{effect:?}")
+            };
+            for e in core.handle(Event::Looked { id, found: None }) {
+                let Effect::Start { id, threads, .. } = e else {
+                    panic!("{e:?}")
+                };
+                let at = core.instances()[id].step;
+                found.push((w.steps[at].name.clone(), threads));
+            }
+        }
+        found
+    };
+    let named = |list: &[(&str, u32)]| -> Vec<(String, u32)> {
+        list.iter().map(|(n, t)| ((*n).to_owned(), *t)).collect()
+    };
+    assert_eq!(first(2), named(&[("coarse", 2)]));
+    assert_eq!(first(5), named(&[("coarse", 5)]));
+    // Enough for all.
+    let all = named(&[("coarse", 2), ("drape", 2), ("shape", 2)]);
+    assert_eq!(first(6), all);
+}

@@ -169,9 +169,9 @@ fn limits_are_judged_and_run_nothing_again(study: &Study) {
     let ended = study.run(&["--check"]);
     assert_eq!((ended.code, ended.executed), (Some(5), 0));
     assert_eq!(code(), Some(5));
-    let told = study.results();
+    let results = study.results();
     let verdict = |limit: &str| {
-        let mut all = told["limits"].as_array().unwrap().iter();
+        let mut all = results["limits"].as_array().unwrap().iter();
         let found = all.find(|l| l["limit"] == limit).unwrap();
         (
             found["verdict"].clone(),

@@ -90,16 +90,13 @@ fn lead(cause: Cause, with: &[&Finding], found: &[&(LimitOn, Finding)]) -> Optio
             };
             let mut gaps: Vec<&Finding> = found.iter().filter(gap).map(|(_, f)| f).collect();
             gaps.dedup_by_key(|f| f.name.clone());
-            let beside = match with.len() {
-                0 => String::new(),
-                1 => format!(
-                    " {} lies beside a bridge, where length is left over.",
-                    named(with)
-                ),
-                _ => format!(
-                    " {} lie beside bridges, where length is left over.",
-                    named(with)
-                ),
+            let lies = match with.len() {
+                1 => "lies beside a bridge",
+                _ => "lie beside bridges",
+            };
+            let beside = match with.is_empty() {
+                true => String::new(),
+                false => format!(" {} {lies}, where length is left over.", named(with)),
             };
             let bridges = match gaps.is_empty() {
                 true => String::new(),
