@@ -58,6 +58,7 @@ mod tests {
     use super::*;
     use crate::hemisphere::hemisphere;
     use crate::stl;
+    use plyflow_model::tool::place::Place;
     use plyflow_model::units::Length;
     use std::io::Write;
     use std::sync::Arc;
@@ -67,6 +68,10 @@ mod tests {
         InputTool {
             body: "dome".into(),
             translate: translate.map(Length),
+            up: None,
+            rotate: None,
+            centre: None,
+            foot: None,
             given: Some(Arc::new(GivenSurface {
                 step: "cad".into(),
                 points,
@@ -84,7 +89,11 @@ mod tests {
         let bytes = plyflow_files::stl::write(&facets);
         let mut file = tempfile::NamedTempFile::new().unwrap();
         file.write_all(&bytes).unwrap();
-        let by_file = stl::read(file.path(), 1e-3, [0.0, 0.0, 0.01]).unwrap();
+        let place = Place {
+            translate: [0.0, 0.0, 0.01],
+            ..Place::default()
+        };
+        let by_file = stl::read(file.path(), 1e-3, &place).unwrap().0;
         // As a step has them that read the same file: scaled, and each point once or once for each triangle.
         let read = plyflow_files::stl::parse(&bytes).unwrap().corners;
         let apart: Vec<[f64; 3]> = read
@@ -97,7 +106,9 @@ mod tests {
             .collect();
         let shared = crate::facets::join(apart.as_chunks::<3>().0);
         for (points, triangles) in [(apart, each), (shared.points, shared.triangles)] {
-            let by_step = super::read(&tool(points, triangles, [0.0, 0.0, 0.01])).unwrap();
+            let by_step = super::read(&tool(points, triangles, [0.0, 0.0, 0.01]))
+                .unwrap()
+                .0;
             assert_eq!(by_step.triangles, by_file.triangles);
             let bits = |m: &ToolMesh| -> Vec<[u64; 3]> {
                 m.points.iter().map(|p| p.map(f64::to_bits)).collect()
