@@ -191,11 +191,11 @@ fn a_tool_in_aircraft_coordinates_and_inches_is_draped_as_the_one_in_its_place_t
     );
 
     // Not by quarters: the same to 1e-9 m.
-    let (sine, cosine) = 0.5236_f64.sin_cos();
+    let (sine, cosine) = 0.4_f64.sin_cos();
     let turned =
         |[x, y, z]: [f64; 3]| [cosine * x - sine * y + 7.0, sine * x + cosine * y, z - 2.0];
     write_text(&there, &block, turned);
-    let words = json!({"unit": "1 m", "rotate": "-0.5236 rad", "centre": "auto", "foot": "auto"});
+    let words = json!({"unit": "1 m", "rotate": "-0.4 rad", "centre": "auto", "foot": "auto"});
     let askew = formed(stl(&there, words)).unwrap();
     for (one, other) in askew.bodies.iter().zip(&own.bodies) {
         assert_eq!(one.cells, other.cells);
