@@ -57,21 +57,13 @@ impl ByItem {
     }
 }
 
-/// An instance that may start: how late its step is, its step, its item, and itself.
-type Ready = (usize, usize, Vec<u64>, Id);
-
 /// The state of a run.
 pub struct Core<'g> {
     graph: &'g Graph,
     limits: Limits,
     instances: Vec<Instance>,
     by_item: Vec<ByItem>,
-    /// What may start: by `late`, then in order of the workflow.
-    ready: BTreeSet<Ready>,
-    /// By step, how much shorter the chain of steps behind it is than the longest of the workflow.
-    late: Vec<usize>,
-    /// How many are ready, by `late`.
-    ready_by_late: Vec<u32>,
+    ready: BTreeSet<(usize, Vec<u64>, Id)>,
     running: usize,
     looking: usize,
     open: usize,
@@ -86,17 +78,12 @@ pub struct Core<'g> {
 impl<'g> Core<'g> {
     /// A run that has not begun.
     pub fn new(graph: &'g Graph, limits: Limits) -> Self {
-        let chains = graph.chains();
-        let longest = chains.iter().max().copied().unwrap_or(0);
-        let late = chains.iter().map(|own| longest - own).collect();
         Self {
             graph,
             limits,
             instances: Vec::new(),
             by_item: vec![ByItem::default(); graph.steps.len()],
             ready: BTreeSet::new(),
-            ready_by_late: vec![0; chains.iter().max().map_or(0, |n| n + 1)],
-            late,
             running: 0,
             looking: 0,
             open: 0,
@@ -364,12 +351,12 @@ impl<'g> Core<'g> {
             let mut inputs = self.instances[*id].inputs.iter();
             inputs.any(|(_, giver)| ids.contains(giver))
         };
-        let readers: Vec<_> = (self.ready.iter().filter(|e| is_of(&e.3)))
+        let readers: Vec<_> = (self.ready.iter().filter(|e| is_of(&e.2)))
             .cloned()
             .collect();
         for entry in readers {
-            self.take_out(&entry);
-            self.missing(entry.3);
+            self.ready.remove(&entry);
+            self.missing(entry.2);
         }
     }
 
@@ -379,9 +366,8 @@ impl<'g> Core<'g> {
         if open.is_empty() {
             self.instances[id].state = State::Ready;
             let instance = &self.instances[id];
-            let late = self.late[instance.step];
-            let entry = (late, instance.step, instance.item.clone(), id);
-            self.ready_by_late[late] += u32::from(self.ready.insert(entry));
+            self.ready
+                .insert((instance.step, instance.item.clone(), id));
         } else {
             self.wait_for(id, &open, &[]);
         }
@@ -459,7 +445,6 @@ impl<'g> Core<'g> {
     fn stop(&mut self) {
         self.stopping = true;
         self.ready.clear();
-        self.ready_by_late.fill(0);
         for (id, instance) in self.instances.iter().enumerate() {
             if matches!(instance.state, State::Running(_)) {
                 self.effects.push(Effect::Cancel(id));
@@ -475,31 +460,19 @@ impl<'g> Core<'g> {
         }
     }
 
-    fn take_out(&mut self, entry: &Ready) {
-        self.ready_by_late[entry.0] -= u32::from(self.ready.remove(entry));
-    }
-
-    /// Starts what fits, what the most waits for first, then in order of the workflow; a smaller one may overtake one that does not fit.
-    ///
-    /// Where there are two cores for each, all share them alike. Else those share them that are the furthest from the end: a coarse run, for
-    /// which all zones wait, does not leave half of the cores to a drape that takes a second.
+    /// Starts what fits, in order of the workflow; a smaller one may overtake one that does not fit.
     fn schedule(&mut self) {
         // While lookups are open more may become ready: shares of cores are dealt when all are known.
         if self.stopping || self.looking > 0 {
             return;
         }
         let mut started = Vec::new();
-        let mut left = self.ready_by_late.clone();
-        let ample = self.free_cores as usize >= 2 * self.ready.len();
         for entry in &self.ready {
             if self.free_cores == 0 {
                 break;
             }
-            let plan = &self.graph.steps[entry.1];
-            let rest = match ample {
-                true => left.iter().sum(),
-                false => left[entry.0],
-            };
+            let plan = &self.graph.steps[entry.0];
+            let rest = (self.ready.len() - started.len()) as u32;
             let threads = match plan.cores {
                 0 => (self.free_cores / rest).max(1),
                 stated => stated.min(self.limits.cores.max(1)),
@@ -512,20 +485,19 @@ impl<'g> Core<'g> {
             self.free_cores -= threads;
             self.used_memory = memory;
             self.running += 1;
-            left[entry.0] -= 1;
-            let instance = &mut self.instances[entry.3];
+            let instance = &mut self.instances[entry.2];
             instance.state = State::Running(threads);
             instance.attempts += 1;
             let attempt = instance.attempts;
             self.effects.push(Effect::Start {
-                id: entry.3,
+                id: entry.2,
                 threads,
                 attempt,
             });
             started.push(entry.clone());
         }
         for entry in started {
-            self.take_out(&entry);
+            self.ready.remove(&entry);
         }
     }
 }

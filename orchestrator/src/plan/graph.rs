@@ -213,22 +213,6 @@ impl Graph {
         })
     }
 
-    /// Of each step, how many wanted ones the longest chain has that begins with it: 1 where nothing waits for it.
-    pub fn chains(&self) -> Vec<usize> {
-        let mut chains = vec![0; self.steps.len()];
-        // A step comes before those that use it.
-        for at in (0..self.steps.len())
-            .rev()
-            .filter(|at| self.steps[*at].wanted)
-        {
-            let down = self
-                .edges
-                .neighbors_directed(NodeIndex::new(at), Direction::Outgoing);
-            chains[at] = 1 + down.map(|n| chains[n.index()]).max().unwrap_or(0);
-        }
-        chains
-    }
-
     /// Indices of the steps that a name means: the one of that name, or those of all points of a study.
     pub fn named(&self, name: &str) -> Vec<usize> {
         match self.find(name) {

@@ -38,7 +38,7 @@ pub struct RigidTool {
 }
 
 /// The triangles of a scene's tool, once they are known to be a tool in the right place: its file can be read and has one outside
-/// ([`build`]), it is no speck beside `spacing` (m), stands on the bed with all of its bodies, fits into the frame and has no walls
+/// ([`crate::build`]), it is no speck beside `spacing` (m), stands on the bed with all of its bodies, fits into the frame and has no walls
 /// thinner than a ply.
 ///
 /// # Errors
