@@ -128,7 +128,8 @@ typedef struct pf_services {
   int32_t (*cancelled)(void *host); /* 1: the run is being stopped; return PF_CANCELLED soon */
 
   void (*fail)(void *host, pf_str text); /* the text of the error that is about to be returned */
-  uint32_t (*threads)(void *host);       /* how many threads this step may use */
+  uint32_t (*threads)(void *host);       /* how many threads this step may use now: at first, and never fewer; more while the run has cores that
+                                            nothing else can use, so that a long step asks again now and then. What it writes does not depend on it */
   pf_str (*parameters)(void *host);      /* JSON object: the resolved `with` block, SI numbers (in scenes and materials quantities are texts in SI
                                             units, "0.005 m": schemas/manifest.md) */
   pf_str (*scratch)(void *host);         /* a private folder, removed after the step */

@@ -4,6 +4,7 @@ use crate::breach::ComponentError;
 use crate::catalog::find_component_library;
 use crate::checkpoints::Checkpoints;
 use crate::emitter::Emitter;
+use crate::lent::Lent;
 use crate::load::Plugin;
 use plyflow_abi::{PF_BAD_SHAPE, PF_BAD_VALUE, PF_ERROR, PF_NOT_FOUND};
 use plyflow_artifact::{Artifact, ArtifactError, ArtifactWriter, ErrorKind};
@@ -11,6 +12,7 @@ use plyflow_model::job::{Job, LogLevel, NamedResult};
 use plyflow_model::manifest::PluginKind;
 use serde_json::json;
 use std::cell::OnceCell;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// One input artifact, opened when the plugin first reads it.
@@ -45,6 +47,9 @@ pub(crate) struct HostState<'a, 'w> {
     pub(crate) scratch: OnceLock<String>,
     pub(crate) slots: Vec<InputSlot>,
     pub(crate) checkpoints: Checkpoints<'a>,
+    lent: Lent,
+    /// The most threads that the step was told it may use.
+    most_threads: AtomicU32,
     output: Mutex<Output>,
 }
 
@@ -53,6 +58,7 @@ impl<'a, 'w> HostState<'a, 'w> {
         job: &'a Job,
         plugin: &'a Plugin,
         emitter: &'a Emitter<'w>,
+        lent: Lent,
     ) -> Result<Self, ArtifactError> {
         let inputs: Vec<serde_json::Value> = job
             .inputs
@@ -82,8 +88,23 @@ impl<'a, 'w> HostState<'a, 'w> {
             scratch: OnceLock::new(),
             slots: job.inputs.iter().map(|_| InputSlot::default()).collect(),
             checkpoints: Checkpoints::new(job.checkpoints.as_ref()),
+            lent,
+            most_threads: AtomicU32::new(job.threads.max(1)),
             output: Mutex::new(output),
         })
+    }
+
+    /// How many threads the step may use at the moment: never fewer than its job has.
+    pub(crate) fn threads(&self) -> u32 {
+        let own = self.job.threads.max(1);
+        let now = self.lent.threads().map_or(own, |lent| lent.max(own));
+        self.most_threads.fetch_max(now, Ordering::Relaxed);
+        now
+    }
+
+    /// The most that [`Self::threads`] has told.
+    pub(crate) fn most_threads(&self) -> u32 {
+        self.most_threads.load(Ordering::Relaxed)
     }
 
     pub(crate) fn output(&self) -> MutexGuard<'_, Output> {

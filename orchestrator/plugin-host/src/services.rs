@@ -348,7 +348,7 @@ fn fail(call: Call<'_>, message: pf_str) {
 }
 
 fn threads(call: Call<'_>) -> u32 {
-    call.state.job.threads.max(1)
+    call.state.threads()
 }
 
 fn parameters(call: Call<'_>) -> pf_str {

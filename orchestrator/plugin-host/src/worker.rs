@@ -2,6 +2,7 @@
 
 use crate::emitter::Emitter;
 use crate::host::HostState;
+use crate::lent::Lent;
 use crate::load::Plugin;
 use crate::{process, services};
 use camino::Utf8Path;
@@ -27,15 +28,16 @@ type Failure = (FailureKind, String);
 pub unsafe fn worker_main(source: &str) -> i32 {
     process::become_worker();
     let mut out = process::private_stdout();
-    let mut document = String::new();
+    let mut document = Vec::new();
     let read = if source == "-" {
-        std::io::stdin().lock().read_to_string(&mut document)
+        std::io::stdin().lock().read_to_end(&mut document)
     } else {
-        std::fs::File::open(source).and_then(|mut f| f.read_to_string(&mut document))
+        std::fs::File::open(source).and_then(|mut f| f.read_to_end(&mut document))
     };
+    let (text, lent) = Lent::split(&document, std::io::stdin());
     let job = read
         .map_err(|e| e.to_string())
-        .and_then(|_| serde_json::from_str::<Job>(&document).map_err(|e| e.to_string()));
+        .and_then(|_| serde_json::from_slice::<Job>(text).map_err(|e| e.to_string()));
     drop(document);
     match job {
         Ok(job) => {
@@ -44,7 +46,7 @@ pub unsafe fn worker_main(source: &str) -> i32 {
                 process::announce_threads(job.threads.max(1));
                 process::limit_memory(job.memory_limit);
             }
-            run_job(&job, &mut out)
+            run_with(&job, lent, &mut out)
         }
         Err(e) => {
             let message = format!("the job {source} cannot be read: {e}");
@@ -64,8 +66,13 @@ pub unsafe fn worker_main(source: &str) -> i32 {
 /// Returns the exit code: 0 or 1.
 #[must_use]
 pub fn run_job(job: &Job, events: &mut (dyn Write + Send)) -> i32 {
+    run_with(job, Lent::default(), events)
+}
+
+/// [`run_job`], with what an engine tells meanwhile.
+fn run_with(job: &Job, lent: Lent, events: &mut (dyn Write + Send)) -> i32 {
     let emitter = Emitter::new(events);
-    let outcome = run(job, &emitter);
+    let outcome = run(job, lent, &emitter);
     if job.scratch.exists()
         && let Err(e) = std::fs::remove_dir_all(&job.scratch)
     {
@@ -91,14 +98,15 @@ pub fn run_job(job: &Job, events: &mut (dyn Write + Send)) -> i32 {
     }
 }
 
-fn run(job: &Job, emitter: &Emitter<'_>) -> Result<Record, Failure> {
+fn run(job: &Job, lent: Lent, emitter: &Emitter<'_>) -> Result<Record, Failure> {
     let started = SystemTime::now()
         .duration_since(UNIX_EPOCH)
         .unwrap_or_default()
         .as_secs_f64();
     let plugin = load(job)?;
     let malformed = |text: String| (FailureKind::Malformed, text);
-    let state = HostState::new(job, &plugin, emitter).map_err(|e| (kind_of(e.kind), e.message))?;
+    let state =
+        HostState::new(job, &plugin, emitter, lent).map_err(|e| (kind_of(e.kind), e.message))?;
     let clock = Instant::now();
     let table = services::table(&state);
     let functions = plugin.functions().cast::<pf_step_functions>();
@@ -112,7 +120,7 @@ fn run(job: &Job, emitter: &Emitter<'_>) -> Result<Record, Failure> {
         // With what it has started and waited for: a step in Python runs in a process of its own.
         cpu_seconds: process::cpu_seconds() + process::children_seconds(),
         peak_memory: process::peak_memory().max(process::children_peak_memory()),
-        threads: job.threads.max(1),
+        threads: state.most_threads(),
     });
     let mut output = state.output();
     judge(job, code, &mut output)?;

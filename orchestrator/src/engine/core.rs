@@ -24,6 +24,8 @@ pub struct Instance {
     pub labels: Option<Vec<String>>,
     /// Attempts begun.
     pub attempts: u32,
+    /// Threads that it was told last that it may use, while it runs.
+    told: u32,
     pending: usize,
     on_key: Vec<Id>,
     on_done: Vec<Id>,
@@ -225,6 +227,7 @@ impl<'g> Core<'g> {
                 inputs: Vec::new(),
                 labels: None,
                 attempts: 0,
+                told: 0,
                 pending: 0,
                 on_key: Vec::new(),
                 on_done: Vec::new(),
@@ -243,7 +246,11 @@ impl<'g> Core<'g> {
                 _ => {}
             }
         }
-        self.schedule();
+        // While lookups are open more may become ready: shares of cores are dealt when all are known.
+        if !self.stopping && self.looking == 0 {
+            self.schedule();
+            self.lend();
+        }
         std::mem::take(&mut self.effects)
     }
 
@@ -462,10 +469,6 @@ impl<'g> Core<'g> {
 
     /// Starts what fits, in order of the workflow; a smaller one may overtake one that does not fit.
     fn schedule(&mut self) {
-        // While lookups are open more may become ready: shares of cores are dealt when all are known.
-        if self.stopping || self.looking > 0 {
-            return;
-        }
         let mut started = Vec::new();
         for entry in &self.ready {
             if self.free_cores == 0 {
@@ -488,6 +491,7 @@ impl<'g> Core<'g> {
             let instance = &mut self.instances[entry.2];
             instance.state = State::Running(threads);
             instance.attempts += 1;
+            instance.told = threads;
             let attempt = instance.attempts;
             self.effects.push(Effect::Start {
                 id: entry.2,
@@ -498,6 +502,27 @@ impl<'g> Core<'g> {
         }
         for entry in started {
             self.ready.remove(&entry);
+        }
+    }
+
+    /// Lends the cores that nothing can be started on to what runs, in equal parts, the earlier ones first. They stay free: what becomes
+    /// ready takes them back. A step that states its cores keeps to them.
+    fn lend(&mut self) {
+        let graph = self.graph;
+        let takes = |(id, i): (Id, &Instance)| match i.state {
+            State::Running(own) if graph.steps[i.step].cores == 0 => Some((id, own)),
+            _ => None,
+        };
+        let takers: Vec<(Id, u32)> = (self.instances.iter().enumerate())
+            .filter_map(takes)
+            .collect();
+        let many = takers.len() as u32;
+        for (at, (id, own)) in (0..).zip(takers) {
+            let threads = own + self.free_cores / many + u32::from(at < self.free_cores % many);
+            let told = &mut self.instances[id].told;
+            if std::mem::replace(told, threads) != threads {
+                self.effects.push(Effect::Lend { id, threads });
+            }
         }
     }
 }

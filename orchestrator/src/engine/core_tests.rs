@@ -74,6 +74,7 @@ fn play(steps: Vec<ResolvedStep>, script: &Script) -> Play {
                 p.most_at_once = p.most_at_once.max(running.len());
                 continue;
             }
+            Some(Effect::Lend { .. }) => continue,
             Some(Effect::Cancel(id)) => {
                 p.cancelled += 1;
                 running.retain(|(r, _)| *r != id);
@@ -381,6 +382,61 @@ fn a_step_without_stated_cores_gets_all_when_alone_and_a_share_when_not() {
     assert_eq!(threads(1), [4]);
     assert_eq!(threads(2), [2, 2]);
     assert_eq!(threads(6), [1, 1, 1, 1]);
+}
+
+/// What the core says after each of the steps has ended, of four that need 4 cores: `a` takes what it gets, `b` and `c` state one, and `d`,
+/// which waits for `c`, two.
+#[test]
+fn cores_that_nothing_can_be_started_on_are_lent_to_what_runs_and_taken_back() {
+    let mut steps = vec![
+        step("a", &[], &[]),
+        step("b", &[], &[]),
+        step("c", &[], &[]),
+        step("d", &[], &[("in", "c")]),
+    ];
+    for (step, cores) in steps.iter_mut().zip([0, 1, 1, 2]) {
+        step.resources.cores = cores;
+    }
+    let w = workflow(steps);
+    let graph = Graph::new(&w).unwrap();
+    let limits = Limits {
+        cores: 4,
+        memory: 0,
+        policy: FailurePolicy::KeepGoing,
+    };
+    let mut core = Core::new(&graph, limits);
+    let begun = core.start();
+    let mut said = Vec::new();
+    let mut looks: Vec<Effect> = begun;
+    while let Some(Effect::Look(id)) = looks.pop() {
+        let effects = core.handle(Event::Looked { id, found: None });
+        looks.extend(
+            effects
+                .iter()
+                .filter(|e| matches!(e, Effect::Look(_)))
+                .cloned(),
+        );
+        said.extend(
+            effects
+                .into_iter()
+                .filter(|e| !matches!(e, Effect::Look(_))),
+        );
+    }
+    let start = |id, threads| Effect::Start {
+        id,
+        threads,
+        attempt: 1,
+    };
+    let lend = |id, threads| Effect::Lend { id, threads };
+    assert_eq!(said, [start(0, 1), start(1, 1), start(2, 1), lend(0, 2)]);
+    let mut ended = |id| {
+        let output = Output::default();
+        core.handle(Event::Finished { id, output })
+    };
+    assert_eq!(ended(1), [lend(0, 3)]);
+    assert_eq!(ended(2), [start(3, 2), lend(0, 2)], "taken back");
+    assert_eq!(ended(3), [lend(0, 4)]);
+    assert_eq!(ended(0), []);
 }
 
 #[test]

@@ -89,6 +89,7 @@ impl Session<'_> {
                         let task = self.task(id, threads);
                         executor.submit(task);
                     }
+                    Effect::Lend { id, threads } => executor.lend(id, threads),
                     Effect::Cancel(id) => executor.cancel(id, false),
                     Effect::Look(_) | Effect::Skip { .. } => {}
                 }

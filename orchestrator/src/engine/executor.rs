@@ -174,6 +174,10 @@ pub trait Executor {
     /// Asks a job to stop; `now`: without grace. Its end is still reported.
     fn cancel(&mut self, id: usize, now: bool);
 
+    /// Tells a job that runs with how many threads it may go on. Nothing depends on it: an executor that has no word for it leaves jobs with
+    /// those that they were started with.
+    fn lend(&mut self, _id: usize, _threads: u32) {}
+
     /// Where the artifact and the record of a job lie that has ended well, when that is not where its [`Task`] says.
     fn files(&mut self, _id: usize) -> Option<(Utf8PathBuf, Utf8PathBuf)> {
         None

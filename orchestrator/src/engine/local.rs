@@ -3,9 +3,9 @@
 use super::executor::{Executor, Outcome, Report, Task};
 use camino::Utf8PathBuf;
 use plyflow_model::job::{FailureKind, LogLevel, Message};
-use plyflow_plugin_host::Orphans;
+use plyflow_plugin_host::{Lender, Orphans};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::fs::{MemfdFlags, OFlags};
+use rustix::fs::OFlags;
 use rustix::process::{Pid, PidfdFlags, Signal};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -41,6 +41,7 @@ pub struct Local {
 struct Worker {
     process: Child,
     exit: OwnedFd,
+    lender: Lender,
     stdout: Option<ChildStdout>,
     stderr: Option<ChildStderr>,
     line: Vec<u8>,
@@ -128,13 +129,8 @@ impl Local {
         self
     }
 
-    fn spawn(&self, task: &Task) -> io::Result<(Child, OwnedFd)> {
-        let job = serde_json::to_vec(&task.job)?;
-        // A file in memory instead of a pipe: any size, no partner needed, gone with its last user.
-        let memory = rustix::fs::memfd_create("plyflow-job", MemfdFlags::CLOEXEC)?;
-        let mut memory = File::from(memory);
-        memory.write_all(&job)?;
-        io::Seek::rewind(&mut memory)?;
+    fn spawn(&self, task: &Task) -> io::Result<(Child, OwnedFd, Lender)> {
+        let (memory, lender) = Lender::with_job(&serde_json::to_vec(&task.job)?)?;
         // No pre_exec: so the standard library can use posix_spawn, whatever the size of this process.
         let mut process = Command::new(&self.program)
             .arg0("plyflow")
@@ -146,7 +142,7 @@ impl Local {
             .process_group(0)
             .spawn()?;
         match watch(&process) {
-            Ok(exit) => Ok((process, exit)),
+            Ok(exit) => Ok((process, exit, lender)),
             Err(e) => {
                 // Nobody would hear it: left alone it would run beside the next attempt, on the same checkpoints.
                 let _ = process.kill();
@@ -235,7 +231,7 @@ impl Local {
 
 impl Executor for Local {
     fn submit(&mut self, task: Task) {
-        let (mut process, exit) = match self.spawn(&task) {
+        let (mut process, exit, lender) = match self.spawn(&task) {
             Ok(started) => started,
             Err(e) => {
                 let outcome = Outcome::NotStarted(format!("{}: {e}", self.program));
@@ -254,6 +250,7 @@ impl Executor for Local {
             stderr: process.stderr.take(),
             process,
             exit,
+            lender,
             line: Vec::new(),
             verdict: None,
             log: Log {
@@ -304,6 +301,12 @@ impl Executor for Local {
         }
         self.enforce_deadlines();
         Ok(())
+    }
+
+    fn lend(&mut self, id: usize, threads: u32) {
+        if let Some(worker) = self.workers.get(&id) {
+            worker.lender.tell(threads);
+        }
     }
 
     fn cancel(&mut self, id: usize, now: bool) {

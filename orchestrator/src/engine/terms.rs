@@ -100,6 +100,13 @@ pub enum Effect {
         /// 1 for the first attempt.
         attempt: u32,
     },
+    /// Tell it, while it runs, with how many threads it may go on.
+    Lend {
+        /// Which.
+        id: Id,
+        /// Those that it was started with, and cores that nothing else can use now.
+        threads: u32,
+    },
     /// Stop it; the answer is still awaited.
     Cancel(Id),
     /// It will not run because `cause` did not succeed.

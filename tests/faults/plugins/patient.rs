@@ -1,5 +1,5 @@
 //! Works for a time in small pieces, keeps checkpoints, and notes in a file of the test when it begins, goes on and ends: so that a test
-//! can count what was run twice. May also take memory.
+//! can count what was run twice. Notes too with how many threads it may go on, when they change. May also take memory.
 
 use plyflow_sdk::{Host, Progress, Step, StepError, export_step};
 use std::io::Write;
@@ -69,8 +69,12 @@ impl Step for Plugin {
         let before: f64 = saved.and_then(|t| t.parse().ok()).unwrap_or(0.0);
         note(&p, if before > 0.0 { "on" } else { "begin" })?;
         let taken = vec![1u8; p.megabytes as usize * 1_000_000];
-        let clock = Instant::now();
+        let (clock, mut threads) = (Instant::now(), host.threads());
         loop {
+            if threads != host.threads() {
+                threads = host.threads();
+                note(&p, &format!("threads {threads} of"))?;
+            }
             let done = before + clock.elapsed().as_secs_f64();
             if done >= p.seconds {
                 break;

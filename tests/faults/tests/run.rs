@@ -539,3 +539,34 @@ fn an_expectation_is_of_every_item_and_of_none_where_there_is_none() {
     assert_eq!(none.run(&["--check"]).0, 0);
     assert_eq!(check(&none).status.code(), Some(0));
 }
+
+/// `1` begins with half of the cores and `2` and, after that, `3` with the rest; when nothing else runs it may use them all.
+#[test]
+fn a_step_goes_on_with_the_cores_that_others_have_left() {
+    let study = Study::new(
+        "steps:\n\
+         \x20 long: {plugin: patient, with: {value: 1, seconds: 4, ledger: ledger}}\n\
+         \x20 short: {plugin: patient, with: {value: 2, seconds: 0.1, ledger: ledger}}\n\
+         \x20 next: {plugin: patient, from: {in: short}, with: {value: 3, seconds: 0.3, ledger: ledger}}\n",
+    );
+    let ledger = study.folder.path().join("ledger");
+    let workflow = study.folder.path().join("workflow.yaml");
+    let text = std::fs::read_to_string(&workflow).unwrap();
+    let named = format!("ledger: {}", ledger.display());
+    std::fs::write(&workflow, text.replace("ledger: ledger", &named)).unwrap();
+    assert_eq!(study.run(&["--jobs", "4"]), (0, [3, 0, 0]));
+    let told = std::fs::read_to_string(&ledger).unwrap();
+    let of_long: Vec<&str> = told
+        .lines()
+        .filter(|l| l.starts_with("threads") && l.ends_with(" of 1"))
+        .collect();
+    assert_eq!(of_long.last(), Some(&"threads 4 of 1"), "{told}");
+    let record = study.call(&["results", "--format", "json"]);
+    let all: Value = serde_json::from_slice(&record.stdout).unwrap();
+    let steps = all["steps"].as_array().unwrap_or_else(|| panic!("{all}"));
+    let threads = |name: &str| {
+        let found = steps.iter().find(|s| s["step"] == name);
+        found.unwrap_or_else(|| panic!("no {name} in {all}"))["cost"]["threads"].clone()
+    };
+    assert_eq!((threads("long"), threads("next")), (4.into(), 2.into()));
+}

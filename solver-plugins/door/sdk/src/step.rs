@@ -274,7 +274,8 @@ impl Host {
         }
     }
 
-    /// Threads that the step may use (at least 1).
+    /// Threads that the step may use now (at least 1). It is given these at its start and keeps them; later there may be more, while the run
+    /// has cores that nothing else can use: a long step asks again now and then. What it writes must not depend on it.
     pub fn threads(&self) -> usize {
         (call!(self.threads()) as usize).max(1)
     }

@@ -1,5 +1,6 @@
 //! The time loop.
 
+use crate::advance::crew::Crew;
 use crate::advance::late;
 use crate::course::{Course, HistoryRow, Observer, Outcome};
 use crate::error::{FormingError, Result};
@@ -54,6 +55,7 @@ struct Run<'a> {
     observer: &'a mut dyn Observer,
     course: Course,
     watch: Watch,
+    crew: Crew,
     /// When it begins and when it ends (s).
     span: [f64; 2],
     /// Whether what has brought it to its late start is still to be counted as work.
@@ -77,6 +79,7 @@ impl<'a> Run<'a> {
         }
         Ok(Self {
             watch: Watch::new(forming),
+            crew: Crew::default(),
             forming,
             control,
             observer,
@@ -129,7 +132,11 @@ impl<'a> Run<'a> {
     fn step(&mut self, frame: usize, steps: Range<u64>) -> Result<()> {
         let fields = steps.start == 0;
         let start = self.time_of(frame);
-        match self.forming.go(&Stretch { start, steps }, fields) {
+        if let Some(threads) = self.observer.threads() {
+            self.crew.change(threads);
+        }
+        let (forming, stretch) = (&mut *self.forming, Stretch { start, steps });
+        match self.crew.work(|| forming.go(&stretch, fields)) {
             Ok(()) => {}
             // The diagnosis has its own cause and remedy.
             Err(MechanicsError::Unstable { cycle, what, .. }) => {

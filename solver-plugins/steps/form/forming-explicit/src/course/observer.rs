@@ -33,6 +33,10 @@ pub trait Observer {
     }
     /// Told when the step has halved since the start, or since it was told last.
     fn slower(&mut self, _what: &str) {}
+    /// How many threads the run may use now; `None`: as many as it began with.
+    fn threads(&self) -> Option<usize> {
+        None
+    }
     /// Called between two frames, where a run can be taken up again.
     fn between_frames(&mut self, _forming: &mut Forming, _course: &mut Course) {}
 }

@@ -120,6 +120,10 @@ impl Observer for Writer<'_> {
         Ok(())
     }
 
+    fn threads(&self) -> Option<usize> {
+        Some(self.host.threads())
+    }
+
     fn slower(&mut self, what: &str) {
         self.host.log(Log::Warn, what);
     }

@@ -13,6 +13,7 @@ use plyflow_kernels::built_in;
 use plyflow_mechanics::energy::Ledger;
 use plyflow_sdk::StepError;
 use serde_json::{Value, json};
+use std::cell::Cell;
 
 /// The components that come along with Plyflow.
 pub struct BuiltIn;
@@ -73,8 +74,37 @@ pub fn woven() -> Value {
     })
 }
 
+/// Gives a run one, two and three threads in turn.
+#[derive(Debug, Default)]
+pub struct ComingAndGoing {
+    /// How often it was asked.
+    pub changes: Cell<usize>,
+}
+
+impl Observer for ComingAndGoing {
+    fn frame(&mut self, _: &Forming, _: f64) -> Result<(), StepError> {
+        Ok(())
+    }
+    fn tick(&mut self, _: &Forming, _: &Ledger, _: f64) -> Result<(), StepError> {
+        Ok(())
+    }
+    fn threads(&self) -> Option<usize> {
+        self.changes.set(self.changes.get() + 1);
+        Some(1 + self.changes.get() % 3)
+    }
+}
+
 /// Builds and runs a scene to its end.
 pub fn form(p: &Parameters, threads: usize) -> (Forming, Outcome) {
+    form_before(&mut Silent, p, threads)
+}
+
+/// The same, with somebody who follows it.
+pub fn form_before(
+    observer: &mut (dyn Observer + Send),
+    p: &Parameters,
+    threads: usize,
+) -> (Forming, Outcome) {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
@@ -82,7 +112,7 @@ pub fn form(p: &Parameters, threads: usize) -> (Forming, Outcome) {
     pool.install(|| {
         let mut forming = build_global(p, &BuiltIn).unwrap();
         let outcome = forming
-            .run(&p.control(), &mut Silent)
+            .run(&p.control(), observer)
             .unwrap_or_else(|e| panic!("{e:?}"));
         (forming, outcome)
     })
