@@ -16,9 +16,10 @@ BOOK := . ./.tools/env && CARGO_TARGET_DIR=$(TARGET)/book-builder cargo
 QUICK := -p plyflow-abi -p plyflow-model -p plyflow-files -p plyflow-fixed -p plyflow-study -p plyflow-sdk -p plyflow-geometry -p plyflow-surface \
   -p plyflow-kernels -p plyflow-blank -p plyflow-conformance -p plyflow-python-law
 
-# The crates whose loops hold invariants, with these looked at. A package's own settings leave all others as they are built already.
-CHECKED := $(foreach crate,mechanics kernels,$(foreach look,debug-assertions overflow-checks,\
-  --config profile.release.package.plyflow-$(crate).$(look)=true))
+# The crates whose loops hold invariants, with these looked at. A package's own settings leave all others as they are built already. In many
+# units, as they run but once.
+CHECKED := $(foreach crate,mechanics kernels,$(foreach look,debug-assertions=true overflow-checks=true codegen-units=16 opt-level=2,\
+  --config profile.release.package.plyflow-$(crate).$(look)))
 
 .PHONY: help build demo check test checked long fuzz hard-cases templates wheel lint bench book docs pictures clean
 
