@@ -16,6 +16,7 @@ mod load;
 mod overrides;
 mod parameters;
 mod paths;
+mod plies;
 mod profile;
 pub mod resolved;
 mod results;
