@@ -259,21 +259,20 @@ impl Filler<'_> {
         let (span, key_span) = (entry.value.span.clone(), entry.key_span.clone());
         entry.value.kind = corners(&found.outline, &span).kind;
         let holes: Vec<Node> = found.holes.iter().map(|h| corners(h, &span)).collect();
-        match (entry_mut(sheet, "holes"), &mut sheet.kind) {
-            (_, Kind::Map(_)) if holes.is_empty() => {}
-            (Some(_), _) => {
-                // Behind those that the scene lists.
-                if let Some(Kind::List(all)) = entry_mut(sheet, "holes").map(|e| &mut e.value.kind)
-                {
-                    all.extend(holes);
-                }
+        if holes.is_empty() {
+            return;
+        }
+        // Behind those that the scene lists.
+        if let Some(entry) = entry_mut(sheet, "holes") {
+            if let Kind::List(all) = &mut entry.value.kind {
+                all.extend(holes);
             }
-            (None, Kind::Map(entries)) => entries.push(Entry {
+        } else if let Kind::Map(entries) = &mut sheet.kind {
+            entries.push(Entry {
                 key: "holes".into(),
                 key_span,
                 value: list(holes, &span),
-            }),
-            _ => {}
+            });
         }
     }
 

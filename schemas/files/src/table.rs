@@ -136,10 +136,10 @@ impl Table {
                 "a head with the columns {columns}, and a row for each"
             ))]);
         };
-        let separator = lines
-            .told
-            .or_else(|| Separator::of_line(line).first().copied())
-            .unwrap_or(Separator::Comma);
+        // Not blanks: names and quantities have some.
+        let ways = Separator::of_line(line).into_iter();
+        let mut ways = ways.filter(|s| *s != Separator::Blanks);
+        let separator = lines.told.or_else(|| ways.next()).unwrap_or(Separator::Comma);
         let mut rows = lines.rows(separator);
         let mut table = Table {
             known,

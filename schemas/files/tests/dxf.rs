@@ -2,7 +2,7 @@
 
 use plyflow_files::dxf::{Drawing, Fineness, Unit};
 use plyflow_files::flaw::plain;
-use plyflow_model::outline::{Region, signed_area};
+use plyflow_model::outline::{Region, sides, signed_area};
 use std::fmt::Write;
 
 const FINE: Fineness = Fineness {
@@ -93,13 +93,13 @@ fn lines_and_arcs_are_joined_whichever_way_they_run_and_what_lies_inside_is_a_ho
             "{p:?}"
         );
     }
-    let end: Vec<_> = slot.outline.iter().filter(|p| p[0] >= 0.1 - 1e-9).collect();
-    for pair in end.windows(2) {
-        let middle = [
-            0.5 * (pair[0][0] + pair[1][0]),
-            0.5 * (pair[0][1] + pair[1][1]),
-        ];
-        let off = 0.02 - (middle[0] - 0.1).hypot(middle[1] - 0.02);
+    let end = |p: [f64; 2]| p[0] >= 0.1 - 1e-9;
+    let arc: Vec<_> = sides(&slot.outline)
+        .filter(|(a, b)| end(*a) && end(*b))
+        .collect();
+    assert!(arc.len() > 20, "{}", arc.len());
+    for (a, b) in arc {
+        let off = 0.02 - (0.5 * (a[0] + b[0]) - 0.1).hypot(0.5 * (a[1] + b[1]) - 0.02);
         assert!(off < FINE.chord, "{off}");
     }
 }
