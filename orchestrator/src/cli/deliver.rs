@@ -55,11 +55,7 @@ pub fn told(all: &[Written]) -> String {
 ///
 /// # Errors
 /// [`exit::USAGE`] when something else is in the way, [`exit::INTERNAL`] when a disk fails.
-pub fn write_all(
-    files: &[Ready],
-    folder: &Utf8Path,
-    force: bool,
-) -> Result<Vec<Written>, Stop> {
+pub fn write_all(files: &[Ready], folder: &Utf8Path, force: bool) -> Result<Vec<Written>, Stop> {
     let mut todo: Vec<(Utf8PathBuf, &Ready, bool)> = Vec::new();
     let mut in_the_way = Vec::new();
     for file in files {

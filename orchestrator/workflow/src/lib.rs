@@ -13,6 +13,7 @@ mod graph;
 mod hints;
 mod limits;
 mod load;
+mod named;
 mod overrides;
 mod parameters;
 mod paths;

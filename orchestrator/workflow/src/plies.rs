@@ -3,7 +3,7 @@
 
 use crate::diagnostics::{Mention, Problems, Source};
 use crate::evidence;
-use crate::parameters::{named, unreadable};
+use crate::named::{named, unreadable};
 use crate::yaml::{Entry, Kind, Node, Span};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_files::book::{self, Row};

@@ -3,7 +3,8 @@
 use crate::check::{Checker, repeated_keys};
 use crate::diagnostics::{Mention, Problems, Source};
 use crate::hints::other_format;
-use crate::parameters::{Place, Resolver, find, named, unreadable};
+use crate::named::{named, unreadable};
+use crate::parameters::{Place, Resolver, find};
 use crate::paths;
 use crate::plies;
 use crate::scene_rules;

@@ -1,7 +1,7 @@
 //! Ply books: tables with a row for each ply, in the order of the layup.
 
 use crate::flaw::Flaw;
-use crate::table::{Amount, Cell, Known, Table};
+use crate::table::{Amount, Cell, Known, Table, TableRow};
 use plyflow_model::units::Dimension;
 use std::ops::Range;
 
@@ -77,26 +77,7 @@ pub fn read(text: &str) -> Result<Book, Vec<Flaw>> {
         let rotation = amount(ROTATION, Some("deg"));
         let place = [amount(X, None), amount(Y, None)];
         let cell = |k: usize| row.cells[k].clone();
-        let missing = |k: usize, of: &str| {
-            Flaw::at(
-                row.span.clone(),
-                format!("the ply has no `{}`", COLUMNS[k].names[0]),
-            )
-            .expected(of)
-        };
-        if row.cells[NAME].is_none() {
-            flaws.push(missing(NAME, "a name of its own in every row"));
-        }
-        if row.cells[ANGLE].is_none() {
-            flaws.push(missing(
-                ANGLE,
-                "the direction of its first fibres, such as `45`",
-            ));
-        }
-        if let (Some(layer), None) = (&row.cells[LAYER], &row.cells[OUTLINE]) {
-            let flaw = Flaw::at(layer.span.clone(), "a `layer` without an `outline`");
-            flaws.push(flaw.expected("the drawing that the layer is of, in the column `outline`"));
-        }
+        flaws.extend(missing(row));
         let (Some(name), Some(angle)) = (cell(NAME), angle) else {
             continue;
         };
@@ -132,6 +113,25 @@ pub fn read(text: &str) -> Result<Book, Vec<Flaw>> {
         true => Ok(Book { rows }),
         false => Err(flaws),
     }
+}
+
+/// What a row leaves open.
+fn missing(row: &TableRow) -> Vec<Flaw> {
+    let mut flaws = Vec::new();
+    for (k, of) in [
+        (NAME, "a name of its own in every row"),
+        (ANGLE, "the direction of its first fibres, such as `45`"),
+    ] {
+        if row.cells[k].is_none() {
+            let problem = format!("the ply has no `{}`", COLUMNS[k].names[0]);
+            flaws.push(Flaw::at(row.span.clone(), problem).expected(of));
+        }
+    }
+    if let (Some(layer), None) = (&row.cells[LAYER], &row.cells[OUTLINE]) {
+        let flaw = Flaw::at(layer.span.clone(), "a `layer` without an `outline`");
+        flaws.push(flaw.expected("the drawing that the layer is of, in the column `outline`"));
+    }
+    flaws
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use crate::flaw::Flaw;
 use crate::number::{Decimal, Signs, plain};
-use crate::rows::{Head, Lines, RowError, Separator, names};
+use crate::rows::{Head, Lines, Row, RowError, Separator, names};
 use crate::text::shown;
 use plyflow_model::units::{Dimension, parse_quantity, parse_unit_of};
 use std::ops::Range;
@@ -66,6 +66,54 @@ fn bare(name: &str) -> String {
     letters.flat_map(char::to_lowercase).collect()
 }
 
+/// The names of all columns.
+fn all(known: &[Known]) -> String {
+    known
+        .iter()
+        .map(|k| k.names[0])
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+/// The column of a name.
+fn position(known: &[Known], name: &str) -> Option<usize> {
+    let name = bare(name);
+    known
+        .iter()
+        .position(|k| k.names.iter().any(|n| *n == name))
+}
+
+/// What is wrong with a name that is no column's.
+fn unknown(known: &[Known], name: &str, span: Range<usize>) -> Option<Flaw> {
+    let note = ["note", "notes", "remark", "comment"].contains(&bare(name).as_str());
+    if note || name.is_empty() {
+        return None;
+    }
+    let flaw = Flaw::at(span, format!("there is no column `{}`", shown(name)));
+    let nearest = plyflow_model::nearest::nearest(name, known.iter().map(|k| k.names[0]));
+    let help = nearest.map(|n| format!("did you mean `{n}`?"));
+    let help = help.unwrap_or_else(|| "a column for readers is called `note`".to_owned());
+    Some(flaw.expected(format!("some of {}", all(known))).help(help))
+}
+
+/// What is wrong with the unit of a head.
+fn wrong_unit(known: &Known, head: &Head, span: Range<usize>) -> Option<Flaw> {
+    let (name, unit) = (known.names[0], head.unit.as_deref()?);
+    match known.of {
+        _ if unit.is_empty() => None,
+        Some(dimension) => {
+            let e = parse_unit_of(unit, dimension).err()?;
+            let problem = format!("the unit of `{name}`: {}", e.reason());
+            Some(Flaw::at(span, problem).help(e.help()))
+        }
+        None if head.certain => {
+            let problem = format!("`{name}` has the unit `{}`", shown(unit));
+            Some(Flaw::at(span, problem).expected("no unit, as its values are words"))
+        }
+        None => None,
+    }
+}
+
 /// A head; `x_mm` is x in mm too.
 fn head(cell: &str, is_quantity: impl Fn(&str, &str) -> bool) -> Head {
     let found = Head::of(cell);
@@ -106,105 +154,97 @@ fn spans(line: &str, separator: Separator) -> Vec<Range<usize>> {
     found
 }
 
+/// Where lines and cells of a text stand.
+struct Places<'t> {
+    text: &'t str,
+    /// First byte of each line.
+    starts: Vec<usize>,
+    separator: Separator,
+}
+
+impl<'t> Places<'t> {
+    fn of(text: &'t str) -> Self {
+        let ends = text.bytes().enumerate().filter(|(_, b)| *b == b'\n');
+        Self {
+            text,
+            starts: std::iter::once(0).chain(ends.map(|(i, _)| i + 1)).collect(),
+            separator: Separator::Comma,
+        }
+    }
+
+    /// All of a line (from 1).
+    fn line(&self, line: usize) -> Range<usize> {
+        let start = self.starts.get(line.max(1) - 1).copied().unwrap_or(0);
+        let rest = &self.text[start..];
+        start..start + rest.find('\n').unwrap_or(rest.len())
+    }
+
+    /// A cell of a line that has so many; all of the line where that is not clear.
+    fn cell(&self, line: usize, count: usize, k: usize) -> Range<usize> {
+        let whole = self.line(line);
+        let cells = spans(&self.text[whole.clone()], self.separator);
+        let cell = cells.get(k).filter(|_| cells.len() == count);
+        cell.map_or(whole.clone(), |c| {
+            whole.start + c.start..whole.start + c.end
+        })
+    }
+
+    fn flaw(&self, e: RowError) -> Vec<Flaw> {
+        vec![Flaw::at(self.line(e.line), e.problem)]
+    }
+}
+
 impl Table {
     /// Reads a table; `text` is what [`crate::flaw::plain`] gives of its file, `most` the most rows that it may have.
     ///
     /// # Errors
     /// What is wrong with its form, with the place of each.
     pub fn read(text: &str, known: &'static [Known], most: usize) -> Result<Self, Vec<Flaw>> {
-        let mut starts = vec![0];
-        starts.extend(
-            text.bytes()
-                .enumerate()
-                .filter(|(_, b)| *b == b'\n')
-                .map(|(i, _)| i + 1),
-        );
-        let line_at = |line: usize| -> Range<usize> {
-            let start = starts.get(line.max(1) - 1).copied().unwrap_or(0);
-            let length = text[start..].find('\n').unwrap_or(text.len() - start);
-            start..start + length
-        };
-        let at = |e: RowError| vec![Flaw::at(line_at(e.line), e.problem)];
-        let lines = Lines::new(text.as_bytes()).map_err(at)?;
-        let columns = known
-            .iter()
-            .map(|k| k.names[0])
-            .collect::<Vec<_>>()
-            .join(", ");
+        let mut places = Places::of(text);
+        let lines = Lines::new(text.as_bytes()).map_err(|e| places.flaw(e))?;
         let Some((first, line)) = lines.first() else {
-            return Err(vec![Flaw::whole("the table is empty").expected(format!(
-                "a head with the columns {columns}, and a row for each"
-            ))]);
+            let expected = format!("a head with the columns {}, and a row for each", all(known));
+            return Err(vec![Flaw::whole("the table is empty").expected(expected)]);
         };
         // Not blanks: names and quantities have some.
         let ways = Separator::of_line(line).into_iter();
         let mut ways = ways.filter(|s| *s != Separator::Blanks);
-        let separator = lines.told.or_else(|| ways.next()).unwrap_or(Separator::Comma);
-        let mut rows = lines.rows(separator);
+        places.separator = lines
+            .told
+            .or_else(|| ways.next())
+            .unwrap_or(Separator::Comma);
+        let mut rows = lines.rows(places.separator);
         let mut table = Table {
             known,
             heads: vec![None; known.len()],
-            head: line_at(first),
+            head: places.line(first),
             rows: Vec::new(),
             decimal: Decimal::Point,
         };
-        let place = |line: usize, count: usize, k: usize| {
-            let whole = line_at(line);
-            let cells = spans(&text[whole.clone()], separator);
-            let cell = cells.get(k).filter(|_| cells.len() == count);
-            cell.map_or(whole.clone(), |c| {
-                whole.start + c.start..whole.start + c.end
-            })
-        };
         let mut order = Vec::new();
-        if let Some(row) = rows.read().map_err(at)? {
-            let spans: Vec<Range<usize>> = (0..row.cells.len())
-                .map(|k| place(first, row.cells.len(), k))
-                .collect();
-            order = table.columns(row.cells.iter().zip(spans), &columns)?;
+        if let Some(row) = rows.read().map_err(|e| places.flaw(e))? {
+            let count = row.cells.len();
+            let spans = (0..count).map(|k| places.cell(first, count, k));
+            order = table.columns(row.cells.iter().zip(spans))?;
         }
         let (mut flaws, mut signs) = (Vec::new(), Signs::default());
-        while let Some(row) = rows.read().map_err(at)? {
+        while let Some(row) = rows.read().map_err(|e| places.flaw(e))? {
             if table.rows.len() >= most {
-                flaws.push(
-                    Flaw::at(
-                        line_at(row.line),
-                        format!("the table has more than {most} rows"),
-                    )
-                    .expected(format!("at most {most}")),
+                let flaw = Flaw::at(
+                    places.line(row.line),
+                    format!("the table has more than {most} rows"),
                 );
+                flaws.push(flaw.expected(format!("at most {most}")));
                 break;
             }
-            let count = row.cells.len();
-            let mut cells = vec![None; known.len()];
-            for (k, text) in row.cells.iter().enumerate().filter(|c| !c.1.is_empty()) {
-                let span = place(row.line, count, k);
-                let Some(column) = order.get(k) else {
-                    let problem = format!(
-                        "`{}` stands behind the last column of the head",
-                        shown(text)
-                    );
-                    let flaw =
-                        Flaw::at(span, problem).expected(format!("at most {} cells", order.len()));
-                    flaws.push(
-                        flaw.help("put quotes around a text that has the sign between cells in it"),
-                    );
-                    break;
-                };
-                if let Some(column) = *column {
-                    if known[column].of.is_some() {
-                        signs.note(row.line, number_of(text));
-                    }
-                    let text = text.to_owned();
-                    cells[column] = Some(Cell { text, span });
-                }
+            match table.row(row, &order, &places, &mut signs) {
+                Ok(row) => table.rows.push(row),
+                Err(flaw) => flaws.push(flaw),
             }
-            let span = place(row.line, count, 0).start..line_at(row.line).end;
-            table.rows.push(TableRow { cells, span });
         }
         match signs.decide() {
             Ok(decimal) => table.decimal = decimal,
-            Err((line, problem)) => flaws.push(Flaw::at(line_at(line), problem)),
+            Err((line, problem)) => flaws.push(Flaw::at(places.line(line), problem)),
         }
         match flaws.is_empty() {
             true => Ok(table),
@@ -212,95 +252,79 @@ impl Table {
         }
     }
 
+    /// A row; `order`: the known column of each cell.
+    fn row(
+        &self,
+        row: Row<'_>,
+        order: &[Option<usize>],
+        places: &Places<'_>,
+        signs: &mut Signs,
+    ) -> Result<TableRow, Flaw> {
+        let count = row.cells.len();
+        let mut cells = vec![None; self.known.len()];
+        for (k, text) in row.cells.iter().enumerate().filter(|c| !c.1.is_empty()) {
+            let span = places.cell(row.line, count, k);
+            let Some(column) = order.get(k) else {
+                let problem = format!(
+                    "`{}` stands behind the last column of the head",
+                    shown(text)
+                );
+                let flaw =
+                    Flaw::at(span, problem).expected(format!("at most {} cells", order.len()));
+                return Err(
+                    flaw.help("put quotes around a text that has the sign between cells in it")
+                );
+            };
+            if let Some(column) = *column {
+                if self.known[column].of.is_some() {
+                    signs.note(row.line, number_of(text));
+                }
+                let text = text.to_owned();
+                cells[column] = Some(Cell { text, span });
+            }
+        }
+        let span = places.cell(row.line, count, 0).start..places.line(row.line).end;
+        Ok(TableRow { cells, span })
+    }
+
     /// Takes the heads; gives the known column of each. A column `note` is for readers, and has none.
     fn columns<'c>(
         &mut self,
         cells: impl Iterator<Item = (&'c str, Range<usize>)>,
-        expected: &str,
     ) -> Result<Vec<Option<usize>>, Vec<Flaw>> {
         let known = self.known;
-        let position = |name: &str| {
-            known
-                .iter()
-                .position(|k| k.names.iter().any(|n| *n == bare(name)))
-        };
         let fits = |name: &str, unit: &str| {
-            let of = position(name).and_then(|k| known[k].of);
+            let of = position(known, name).and_then(|k| known[k].of);
             of.is_some_and(|d| parse_unit_of(unit, d).is_ok())
         };
         let (mut order, mut flaws) = (Vec::new(), Vec::new());
         for (cell, span) in cells {
             let head = head(cell, fits);
-            let note = ["note", "notes", "remark", "comment"].contains(&bare(&head.name).as_str());
-            let column = position(&head.name);
+            let column = position(known, &head.name);
             order.push(column);
-            let Some(k) = column else {
-                if !note && !head.name.is_empty() {
-                    let flaw =
-                        Flaw::at(span, format!("there is no column `{}`", shown(&head.name)));
-                    let nearest = plyflow_model::nearest::nearest(
-                        &head.name,
-                        known.iter().map(|k| k.names[0]),
-                    );
-                    let help = nearest
-                        .map_or("a column for readers is called `note`".to_owned(), |n| {
-                            format!("did you mean `{n}`?")
-                        });
-                    flaws.push(flaw.expected(format!("some of {expected}")).help(help));
+            match column {
+                Some(k) if self.heads[k].is_some() => {
+                    let problem = format!("two columns are `{}`", known[k].names[0]);
+                    flaws.push(Flaw::at(span, problem).expected("one of each"));
                 }
-                continue;
-            };
-            if self.heads[k].is_some() {
-                flaws.push(
-                    Flaw::at(span, format!("two columns are `{}`", known[k].names[0]))
-                        .expected("one of each"),
-                );
-                continue;
+                Some(k) => {
+                    flaws.extend(wrong_unit(&known[k], &head, span));
+                    self.heads[k] = Some(head);
+                }
+                None => flaws.extend(unknown(known, &head.name, span)),
             }
-            let unit = head.unit.as_deref().filter(|u| !u.is_empty());
-            match (unit, known[k].of) {
-                (Some(unit), Some(dimension)) => {
-                    if let Err(e) = parse_unit_of(unit, dimension) {
-                        flaws.push(
-                            Flaw::at(
-                                span,
-                                format!("the unit of `{}`: {}", known[k].names[0], e.reason()),
-                            )
-                            .help(e.help()),
-                        );
-                    }
-                }
-                (Some(unit), None) if head.certain => {
-                    flaws.push(
-                        Flaw::at(
-                            span,
-                            format!("`{}` has the unit `{}`", known[k].names[0], shown(unit)),
-                        )
-                        .expected("no unit, as its values are words"),
-                    );
-                }
-                _ => {}
-            }
-            self.heads[k] = Some(head);
         }
-        let missing: Vec<&str> = (0..known.len())
-            .filter(|k| known[*k].needed && self.heads[*k].is_none())
-            .map(|k| known[k].names[0])
-            .collect();
+        let missing = (0..known.len()).filter(|k| known[*k].needed && self.heads[*k].is_none());
+        let missing: Vec<&str> = missing.map(|k| known[k].names[0]).collect();
         if !missing.is_empty() && flaws.is_empty() {
             let problem = format!("the head has no column {}", names(missing));
-            flaws
-                .push(Flaw::at(self.head.clone(), problem).expected(format!("some of {expected}")));
+            let flaw = Flaw::at(self.head.clone(), problem);
+            flaws.push(flaw.expected(format!("some of {}", all(known))));
         }
         match flaws.is_empty() {
             true => Ok(order),
             false => Err(flaws),
         }
-    }
-
-    /// Whether the table has a known column.
-    pub fn has(&self, column: usize) -> bool {
-        self.heads[column].is_some()
     }
 
     /// A cell as a quantity of its column: with the unit that it has, with that of the head, or with `else_unit`.

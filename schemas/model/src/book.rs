@@ -2,30 +2,10 @@
 
 use crate::contour::Contour;
 use crate::material::MaterialEntry;
-use crate::scene::Sheet;
 use crate::units::Length;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-
-/// What may stand in a scene's list of sheets. A [`crate::scene::Scene`] has only sheets: who resolves a scene puts the plies of a book in the
-/// place of the words that ask for them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
-pub enum SheetEntry {
-    /// One sheet.
-    Sheet(Box<Sheet>),
-    /// The plies of a ply book, in its order.
-    Book(BookEntry),
-}
-
-/// The plies of a ply book.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct BookEntry {
-    /// The book, and what its rows leave open.
-    pub plies: PlyBook,
-}
 
 /// A ply book: a table with a row for each ply, in the order of the layup, the one nearest the tool first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -13,7 +13,7 @@ use plyflow_fixed::FixedBits;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use crate::book::{PlyBook, SheetEntry};
+pub use crate::book::PlyBook;
 pub use crate::contour::{Circle, Contour, Drawing, NamedContour};
 pub use crate::process::{
     DoubleDiaphragm, Hold, Holder, Press, PressPlate, PressureAt, PressureCourse, PressureTable,
@@ -51,6 +51,25 @@ pub struct Scene {
     /// Mirror planes of everything above: explicit forming computes the part with x >= 0 (y >= 0) and writes the whole.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub symmetry: Vec<MirrorPlane>,
+}
+
+/// What may stand in a scene's list of sheets. A [`Scene`] has only sheets: who resolves a scene puts the plies of a book in the
+/// place of the words that ask for them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum SheetEntry {
+    /// One sheet.
+    Sheet(Box<Sheet>),
+    /// The plies of a ply book, in its order.
+    Book(BookEntry),
+}
+
+/// The plies of a ply book.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BookEntry {
+    /// The book, and what its rows leave open.
+    pub plies: PlyBook,
 }
 
 /// A mirror plane through the tool's axis.

@@ -118,25 +118,12 @@ fn plies(
         return Ok((Plies::Rectangles(size), sheets));
     };
     let read = plies::read(path, of.ply, metres)?;
-    let (named, _) = plies::materials(path, &read.rows);
     let mut materials = Vec::new();
-    for named in named {
+    for named in plies::materials(path, &read.rows).0 {
         match named {
             Named::File(file) => sheets.push(sheet_of(&text_of(&file)?)),
             Named::Name(name) => {
-                let taken = match (take(&name), &given) {
-                    (Ok(taken), _) => taken,
-                    // A name of somebody else's: it stands for the one that is given.
-                    (Err(_), Some(given)) => given.clone(),
-                    (Err(stop), None) => {
-                        let text = format!(
-                            "{path}: the material `{name}`: {}. Or say with --material what names that are no file stand for",
-                            stop.text
-                                .trim_start_matches(&format!("--material {name}: "))
-                        );
-                        return Err(Stop::new(stop.code, text));
-                    }
-                };
+                let taken = of_name(path, &name, given.as_ref(), take)?;
                 sheets.push(taken.1);
                 materials.push((name, taken.0));
             }
@@ -151,6 +138,24 @@ fn plies(
         materials,
     };
     Ok((Plies::Book(book), sheets))
+}
+
+/// What a name of a book's material stands for: one that comes along, or the one of `--material`.
+fn of_name(
+    book: &Utf8Path,
+    name: &str,
+    given: Option<&Material>,
+    take: &mut impl FnMut(&str) -> Result<Material, Stop>,
+) -> Result<Material, Stop> {
+    take(name).or_else(|stop| {
+        given.cloned().ok_or_else(|| {
+            let why = stop.text.trim_start_matches(&format!("--material {name}: "));
+            let text = format!(
+                "{book}: the material `{name}`: {why}. Or say with --material what names that are no file stand for"
+            );
+            Stop::new(stop.code, text)
+        })
+    })
 }
 
 /// The answers: those that are given, and for the others those of who is asked.

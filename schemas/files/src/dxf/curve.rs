@@ -1,31 +1,13 @@
 //! Curves as corners.
 
-use super::{Drawing, Entity, Pair, Unit, span};
+use super::read::{Drawing, Pair, span};
+use super::unit::Unit;
+use super::walk::{Curve, Entity, degrees};
 use crate::flaw::Flaw;
-use crate::text::shown;
 use crate::turn::sin_cos;
 use plyflow_fixed::FixedBits;
 use plyflow_model::outline::{MOST_CORNERS, Point};
 use std::f64::consts::TAU;
-use std::ops::Range;
-
-/// A curve of a drawing.
-#[derive(Debug, Clone)]
-pub struct Curve {
-    /// Its corners (m), in the order in which it is drawn.
-    pub points: Vec<Point>,
-    /// Whether the last goes on in the first.
-    pub closed: bool,
-    /// What it is.
-    pub kind: String,
-    /// The word that begins it.
-    pub span: Range<usize>,
-}
-
-/// An angle (rad).
-pub fn degrees(angle: f64) -> f64 {
-    (angle % 360.0).to_radians()
-}
 
 /// How many sides stand for an arc of this radius (m) and angle (rad), none of which lies farther off it than `chord` (m).
 fn sides(radius: f64, angle: f64, chord: f64) -> usize {
@@ -76,15 +58,6 @@ impl Drawing<'_> {
             kind: entity.kind.to_owned(),
             span: entity.span.clone(),
         })
-    }
-
-    pub(super) fn wrong(&self, entity: &Entity<'_>, what: &str) -> Flaw {
-        let problem = format!(
-            "the {} on layer `{}` {what}",
-            entity.kind,
-            shown(&entity.layer)
-        );
-        Flaw::at(entity.span.clone(), problem).help("draw it again, or put it on another layer")
     }
 
     /// Refuses what has a height of its own.

@@ -1,6 +1,6 @@
 //! Curves that go on in each other, as closed contours.
 
-use super::curve::Curve;
+use super::walk::Curve;
 use crate::flaw::Flaw;
 use plyflow_fixed::FixedBits;
 use plyflow_model::outline::{MOST_CORNERS, Millimetres, OutlineError, Point, Region, signed_area};
@@ -11,6 +11,24 @@ const SAME: f64 = 1e-9;
 
 /// Most corners of an outline and its holes together: how long it takes to see whether they cross grows with their square.
 const MOST_IN_ALL: usize = 4 * MOST_CORNERS;
+
+/// How curves become corners.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fineness {
+    /// How far the ends of two curves may lie apart that go on in each other (m).
+    pub tolerance: f64,
+    /// How far a side may lie off a round curve (m).
+    pub chord: f64,
+}
+
+impl Default for Fineness {
+    fn default() -> Self {
+        Self {
+            tolerance: plyflow_model::contour::TOLERANCE.si(),
+            chord: plyflow_model::contour::CHORD.si(),
+        }
+    }
+}
 
 /// An outline and its holes (m), in the order in which the file has their corners.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,9 @@
 //! Splines: rational curves of any degree by de Boor's recursion (Piegl and Tiller, The NURBS Book, 1997, algorithm A4.1 in its form
 //! of repeated interpolation).
 
-use super::{Drawing, Entity, Unit};
+use super::read::Drawing;
+use super::unit::Unit;
+use super::walk::Entity;
 use crate::flaw::Flaw;
 use plyflow_model::outline::{MOST_CORNERS, Point, segment_distance};
 
@@ -49,6 +51,27 @@ impl Drawing<'_> {
                 )
                 .help("export splines with control points, or as polylines"));
         }
+        let spline = Spline::new(degree, knots, [x, y], &weights);
+        let spline = spline.map_err(|what| self.wrong(entity, &what))?;
+        let points = spline.corners(chord);
+        let ends = [points.first(), points.last()];
+        let meet = matches!(ends, [Some(a), Some(b)] if (a[0] - b[0]).abs().max((a[1] - b[1]).abs()) <= 1e-9);
+        Ok((points, flags & 1 == 1 && meet))
+    }
+}
+
+impl Spline {
+    /// A spline of control points, whose weights are 1 where none are given.
+    ///
+    /// # Errors
+    /// What it is instead of a spline.
+    fn new(
+        degree: usize,
+        knots: Vec<f64>,
+        [x, y]: [Vec<f64>; 2],
+        weights: &[f64],
+    ) -> Result<Self, String> {
+        let n = x.len();
         let whole = (1..=HIGHEST).contains(&degree)
             && n > degree
             && y.len() == n
@@ -64,25 +87,19 @@ impl Drawing<'_> {
                 knots.len(),
                 weights.len()
             );
-            return Err(self.wrong(entity, &what));
+            return Err(what);
         }
         let pole = |k: usize| {
             let w = weights.get(k).copied().unwrap_or(1.0);
             [w * x[k], w * y[k], w]
         };
-        let spline = Spline {
+        Ok(Spline {
             degree,
             poles: (0..n).map(pole).collect(),
             knots,
-        };
-        let points = spline.corners(chord);
-        let ends = [points.first(), points.last()];
-        let meet = matches!(ends, [Some(a), Some(b)] if (a[0] - b[0]).abs().max((a[1] - b[1]).abs()) <= 1e-9);
-        Ok((points, flags & 1 == 1 && meet))
+        })
     }
-}
 
-impl Spline {
     /// The point at `u` in the interval between the knots `k` and `k + 1`.
     fn at(&self, k: usize, u: f64) -> Point {
         let p = self.degree;
