@@ -15,17 +15,24 @@ PLACE = np.array([12_450.0, 1_980.0, -310.0])
 """Where the middle of its foot lies in the aircraft (mm): x aft, y outboard, z up. The hat points outboard."""
 
 
-def ring(inset: float, height: float, count: int = 10) -> np.ndarray:
-    """A rounded rectangle `[n][3]`, counter-clockwise from above, that lies inside of the foot by `inset`."""
+def ring(inset: float, height: float, shrunk: float = 1.0) -> np.ndarray:
+    """A rounded rectangle `[n][3]`, counter-clockwise from above, that lies inside of the foot by `inset`; `shrunk` draws it together across."""
     half = np.array([0.5 * LENGTH - inset, 0.5 * WIDTH - inset])
     radius = CORNER - inset
+    corners = []
+    for quarter, sign in enumerate(([1, 1], [-1, 1], [-1, -1], [1, -1])):
+        angles = np.radians(np.linspace(90 * quarter, 90 * quarter + 90, 8))
+        corners.append(np.array(sign) * (half - radius) + radius * np.column_stack([np.cos(angles), np.sin(angles)]))
     points = []
-    for quarter in range(4):
-        sign = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]][quarter])
-        for angle in np.radians(np.linspace(90 * quarter, 90 * quarter + 90, count)):
-            points.append(sign * (half - radius) + radius * np.array([np.cos(angle), np.sin(angle)]))
-    flat = np.array(points)
-    return np.column_stack([flat, np.full(len(flat), height)])
+    for quarter, corner in enumerate(corners):
+        # Points along the straight side that follows, no farther apart than the facets of a coarse export.
+        begin, end = corner[-1], corners[(quarter + 1) % 4][0]
+        count = (24, 8)[quarter % 2]
+        points += [corner, begin + (end - begin) * np.linspace(0.0, 1.0, count + 1)[1:-1, None]]
+    flat = np.concatenate(points)
+    # Towards the line along the middle of the top.
+    ridge = np.column_stack([np.clip(flat[:, 0], -0.5 * (LENGTH - WIDTH), 0.5 * (LENGTH - WIDTH)), np.zeros(len(flat))])
+    return np.column_stack([ridge + shrunk * (flat - ridge), np.full(len(flat), height)])
 
 
 def hat() -> None:
@@ -34,17 +41,23 @@ def hat() -> None:
     # Where the round edge begins on the wall: it touches wall and top.
     rise = RADIUS * (1.0 - np.sin(draft))
     begin = (HEIGHT - rise) * np.tan(draft)
-    rings = [ring(0.0, 0.0), ring(begin, HEIGHT - rise)]
+    rings = [ring(share * begin, share * (HEIGHT - rise)) for share in np.linspace(0.0, 1.0, 4)]
     for turn in np.linspace(draft, 0.5 * np.pi, 8)[1:]:
         inset = begin + RADIUS * (np.cos(draft) - np.cos(turn))
         rings.append(ring(inset, HEIGHT - RADIUS * (1.0 - np.sin(turn))))
+    rings += [ring(inset, HEIGHT, shrunk) for shrunk in (0.75, 0.5, 0.25)]
     facets = []
     for low, high in zip(rings, rings[1:]):
         for k in range(len(low)):
             n = (k + 1) % len(low)
             facets += [(low[k], low[n], high[n]), (low[k], high[n], high[k])]
-    top, middle = rings[-1], np.array([0.0, 0.0, HEIGHT])
-    facets += [(top[k], top[(k + 1) % len(top)], middle) for k in range(len(top))]
+    top, ridge = rings[-1], ring(inset, HEIGHT, 0.0)
+    for k in range(len(top)):
+        n = (k + 1) % len(top)
+        facets.append((top[k], top[n], ridge[n]))
+        # The ridge has one point for all of an end.
+        if np.linalg.norm(ridge[k] - ridge[n]) > 1e-9:
+            facets.append((top[k], ridge[n], ridge[k]))
     corners = np.array(facets)
     # Of the hat: x along, y across, z up; of the aircraft: x along, y up, -z across.
     turned = np.stack([corners[..., 0], corners[..., 2], -corners[..., 1]], axis=-1) + PLACE
@@ -68,9 +81,10 @@ def drawing() -> None:
     for cx, cy, begin in [(x - r, -y + r, 270), (x - r, y - r, 0), (-x + r, y - r, 90), (-x + r, -y + r, 180)]:
         add(0, "ARC", 8, "SKIN", 10, cx, 20, cy, 40, r, 50, begin, 51, (begin + 90) % 360)
     # The cap of the crown: a strip with round ends, its corners and bulges in one polyline, and a drain hole.
-    add(0, "LWPOLYLINE", 8, "CAP", 90, 4, 70, 1)
+    add(0, "POLYLINE", 8, "CAP", 66, 1, 70, 1)
     for px, py, bulge in [(-100, -25, 0), (100, -25, 1), (100, 25, 0), (-100, 25, 1)]:
-        add(10, px, 20, py, 42, bulge)
+        add(0, "VERTEX", 8, "CAP", 10, px, 20, py, 42, bulge)
+    add(0, "SEQEND", 8, "CAP")
     add(0, "CIRCLE", 8, "CAP", 10, 80, 20, 0, 40, 8)
     add(0, "TEXT", 8, "NOTES", 10, -60, 20, 100, 40, 6, 1, "HAT STRINGER, FLAT PATTERNS")
     add(0, "ENDSEC", 0, "EOF")

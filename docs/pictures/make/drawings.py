@@ -75,7 +75,7 @@ def new_part():
     runs.plyflow("export", *place, "drape", "--format", "dxf", "--unit", "mm", "--net", "10 mm", "--to", str(folder))
     draped = runs.artifact(place, "drape")
     width, height = 640, 400
-    figure, axes = style.canvas(2 * width, height + 130)
+    figure, axes = style.canvas(2 * width, height + 150)
     scale = 0.86 * width / 0.33
     for layer, points in _lines(folder / "drape-flat.dxf"):
         name = layer.removesuffix("-fibres_1")
@@ -92,5 +92,5 @@ def new_part():
         view.surface(points, cells, paint(np.degrees(draped.at_points(name, "shear_angle")), colours), lift=lift)
         view.lines(points[scene3d.rim(cells)], LAYUP[name], 2.0, lift=lift + 0.5 * OVER_PLY)
     style.put(axes, view.picture(), width, 30)
-    style.colour_bar(figure, (width + 60, height + 60, 420, 20), colours, "shear angle (deg)", ticks=[-40, -20, 0, 20, 40])
+    style.colour_bar(figure, (width + 60, height + 45, 420, 20), colours, "shear angle (deg)", ticks=[-40, -20, 0, 20, 40])
     return style.save_png(figure, "new-part", [colours])

@@ -213,7 +213,9 @@ impl Filler<'_> {
                     false => found,
                 })),
                 Err(flaws) => {
-                    flaws.iter().for_each(|f| self.tell(f, base));
+                    for flaw in flaws {
+                        self.of_drawing(flaw, &drawing.file, span, base);
+                    }
                     None
                 }
             }
@@ -221,6 +223,16 @@ impl Filler<'_> {
         self.sound &= found.is_some();
         self.drawings.insert(key, found.clone());
         found
+    }
+
+    /// Tells what is wrong with a drawing: in its line, or, where it is about all of the file, where that is named.
+    fn of_drawing(&mut self, flaw: Flaw, file: &str, span: &Span, base: usize) {
+        if !flaw.span.is_empty() || flaw.span.start > 0 {
+            return self.tell(&flaw, base);
+        }
+        let problem = format!("`{}`: {}", shown(file), flaw.problem);
+        let span = span.clone();
+        self.tell(&Flaw { span, problem, ..flaw }, 0);
     }
 
     /// What a node `{drawing: {..}}` names; the schema check has spoken about one that is none.

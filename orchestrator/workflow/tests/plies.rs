@@ -201,19 +201,19 @@ fn what_is_wrong_in_a_book_is_told_in_its_line_and_column() {
             "layup/plies.csv",
             ",PLY,",
             ",GONE,",
-            "skin.dxf:1:1: there is no curve on the layer `GONE`",
+            "plies.csv:3:17: `layup/skin.dxf`: there is no curve on the layer `GONE`",
         ),
         (
             "layup/plies.csv",
             ",PLY,",
             ",,",
-            "skin.dxf:1:1: curves lie on 2 layers: `NOTES`, `PLY`",
+            "plies.csv:3:17: `layup/skin.dxf`: curves lie on 2 layers: `NOTES`, `PLY`",
         ),
         (
             "layup/skin.dxf",
             "$INSUNITS\n70\n4",
             "$INSUNITS\n70\n0",
-            "skin.dxf:1:1: the drawing does not say what its unit is",
+            "plies.csv:3:17: `layup/skin.dxf`: the drawing does not say what its unit is",
         ),
         (
             "layup/skin.dxf",
