@@ -232,7 +232,14 @@ impl Filler<'_> {
         }
         let problem = format!("`{}`: {}", shown(file), flaw.problem);
         let span = span.clone();
-        self.tell(&Flaw { span, problem, ..flaw }, 0);
+        self.tell(
+            &Flaw {
+                span,
+                problem,
+                ..flaw
+            },
+            0,
+        );
     }
 
     /// What a node `{drawing: {..}}` names; the schema check has spoken about one that is none.
@@ -387,7 +394,8 @@ impl Filler<'_> {
             (None, true) => None,
             (Some(own), true) => Some(text(&own.text, &span)),
             (None, false) => of.node.get("centre")?.items().get(k).cloned(),
-            (Some(own), false) => Some(length(own.si + by, &span)),
+            // To the picometre, as tools are placed: 10 mm and -100 mm are -90 mm.
+            (Some(own), false) => Some(length(((own.si + by) * 1e12).round() / 1e12, &span)),
         }
     }
 

@@ -159,7 +159,7 @@ fn what_is_wrong_in_a_book_is_told_in_its_line_and_column() {
             "layup/plies.csv",
             "note",
             "colour",
-            "plies.csv:2:59: there is no column `colour`",
+            "plies.csv:2:58: there is no column `colour`",
         ),
         (
             "layup/plies.csv",

@@ -208,7 +208,7 @@ fn an_outline_of_a_drawing_stands_in_the_scene_and_needs_no_step() {
             2,
             "{scene}"
         );
-        assert!(!scene.contains("length: "), "{scene}");
+        assert!(!scene.contains("    length: "), "{scene}");
         let workflow = file(&files, "workflow.yaml");
         assert!(!workflow.contains("geometry"), "{workflow}");
         assert!(!told.contains("trust"), "{told}");
