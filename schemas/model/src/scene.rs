@@ -53,8 +53,8 @@ pub struct Scene {
     pub symmetry: Vec<MirrorPlane>,
 }
 
-/// What may stand in a scene's list of sheets. A [`Scene`] has only sheets: who resolves a scene puts the plies of a book in the
-/// place of the words that ask for them.
+/// What may stand in a scene's list of sheets.
+// A `Scene` has only sheets: who resolves a scene puts the plies of a book in the place of the words that ask for them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum SheetEntry {

@@ -210,7 +210,7 @@ fn an_outline_of_a_drawing_stands_in_the_scene_and_needs_no_step() {
         );
         assert!(!scene.contains("    length: "), "{scene}");
         let workflow = file(&files, "workflow.yaml");
-        assert!(!workflow.contains("geometry"), "{workflow}");
+        assert!(!workflow.contains("geometry:"), "{workflow}");
         assert!(!told.contains("trust"), "{told}");
         args.study.layer = Some("GONE".into());
         let stop = super::files(&args, &root.join("new"), None).unwrap_err();
