@@ -166,7 +166,7 @@ fn what_is_wrong_in_a_book_is_told_in_its_line_and_column() {
             "layup/plies.csv",
             ",10,-5",
             ",10 kg,-5",
-            "plies.csv:3:31: `x`:",
+            "plies.csv:3:30: `x`:",
         ),
         (
             "layup/plies.csv",
@@ -196,7 +196,7 @@ fn what_is_wrong_in_a_book_is_told_in_its_line_and_column() {
             "layup/plies.csv",
             "cap.csv",
             "cup.csv",
-            "plies.csv:4:41: cannot read `layup/cup.csv`: there is no such file",
+            "plies.csv:4:40: cannot read `layup/cup.csv`: there is no such file",
         ),
         (
             "layup/plies.csv",
@@ -220,7 +220,7 @@ fn what_is_wrong_in_a_book_is_told_in_its_line_and_column() {
             "layup/skin.dxf",
             "200.1\n20\n100",
             "x\n20\n100",
-            "skin.dxf:39:1: `x` is no number",
+            "skin.dxf:30:1: `x` is no number",
         ),
         (
             "layup/cap.csv",
@@ -262,7 +262,7 @@ fn what_is_wrong_in_a_book_is_told_in_its_line_and_column() {
             "scene.yaml",
             "      length: 480 mm",
             "      lenght: 480 mm",
-            "there is no `lenght` in",
+            "unknown key `lenght` in `plies`",
         ),
     ] {
         let study = study(ENTRY);
