@@ -430,7 +430,7 @@ impl Filler<'_> {
                 d.expected("the path of a material file from the book, or a name that `materials` beside `book` in the scene has");
             }
             false => {
-                d.suggest(&cell.text, names.into_iter());
+                d.suggest(&cell.text, names);
                 d.expected("a name that `materials` beside `book` in the scene has, or the path of a material file from the book");
             }
         }

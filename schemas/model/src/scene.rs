@@ -61,7 +61,7 @@ pub enum SheetEntry {
     /// One sheet.
     Sheet(Box<Sheet>),
     /// The plies of a ply book, in its order.
-    Book(BookEntry),
+    Book(Box<BookEntry>),
 }
 
 /// The plies of a ply book.
