@@ -42,7 +42,10 @@ struct Answers {
 }
 
 /// A material of the plies: how the scene names it, its thickness (m) and its areal mass (kg/m2), where they are known.
-type Material = (String, [Option<f64>; 2]);
+type Material = (String, Sheet);
+
+/// Thickness (m) and areal mass (kg/m2) of a material, where they are known.
+type Sheet = [Option<f64>; 2];
 
 /// The files of a new study by their paths in its folder, and what to say of it.
 ///
@@ -97,8 +100,8 @@ fn plies(
     folder: &Utf8Path,
     given: Option<Material>,
     take: &mut impl FnMut(&str) -> Result<Material, Stop>,
-) -> Result<(Plies, Vec<[Option<f64>; 2]>), Stop> {
-    let mut sheets: Vec<[Option<f64>; 2]> = given.iter().map(|g| g.1).collect();
+) -> Result<(Plies, Vec<Sheet>), Stop> {
+    let mut sheets: Vec<Sheet> = given.iter().map(|g| g.1).collect();
     let words = &args.study;
     if let Some(path) = &words.dxf {
         let layer = words.layer.clone();
@@ -358,7 +361,7 @@ fn take_material(
 }
 
 /// Thickness (m) and areal mass (kg/m2) of a material's text, where they stand in lines of their own.
-fn sheet_of(text: &str) -> [Option<f64>; 2] {
+fn sheet_of(text: &str) -> Sheet {
     let value = |key: &str, dimension| {
         let line = text
             .lines()
