@@ -1,14 +1,18 @@
-"""The picture of exported drawings: a flat ply with its fibre lines, and both on the formed part, as DXF files have them."""
+"""Pictures of drawings: a flat ply with its fibre lines, and both on the formed part, as DXF files have them; and the plies of a ply book."""
 
+import shutil
 import tempfile
 from pathlib import Path
 
 import ezdxf
 import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 
 import runs
 import scene3d
 import style
+from spar import paint
 
 WIDTH, HEIGHT = 320, 240
 # What the drawings are in (m).
@@ -54,3 +58,39 @@ def export():
     axes.text(20, 18, "hemisphere-flat.dxf", fontsize=7, va="center")
     axes.text(WIDTH + 20, 18, "hemisphere-draped.dxf", fontsize=7, va="center")
     return style.save_png(figure, "export", [])
+
+
+# The plies of the hat stringer, the one nearest to the tool first.
+LAYUP = {"skin": (0.35, 0.35, 0.35), "doubler": (0.0, 0.45, 0.70), "cap": (0.84, 0.37, 0.0)}
+
+
+def new_part():
+    """Left the plies of the book as they lie over the tool, right draped, by the commands of the guide."""
+    folder = runs.STORE / "new-part"
+    shutil.rmtree(folder, ignore_errors=True)
+    hat = runs.workflows() / "hat-stringer"
+    runs.plyflow("new", "study", "hat", "--into", str(folder), "--tool", str(hat / "hat.stl"), "--unit", "mm", "--plies", str(hat / "layup" / "plies.csv"))
+    place = (str(folder / "hat" / "workflow.yaml"),)
+    runs.plyflow("run", *place, "--until", "drape", "--no-report", "--quiet")
+    runs.plyflow("export", *place, "drape", "--format", "dxf", "--unit", "mm", "--net", "10 mm", "--to", str(folder))
+    draped = runs.artifact(place, "drape")
+    width, height = 640, 400
+    figure, axes = style.canvas(2 * width, height + 150)
+    scale = 0.86 * width / 0.33
+    for layer, points in _lines(folder / "drape-flat.dxf"):
+        name = layer.removesuffix("-fibres_1")
+        if name in LAYUP:
+            axes.plot(width / 2 + scale * points[:, 0], 30 + height / 2 - scale * points[:, 1], color=LAYUP[name], linewidth=2.0 if layer == name else 0.5)
+    for k, (name, colour) in enumerate(LAYUP.items()):
+        axes.text(40 + 150 * k, height + 60, name, color=colour, fontsize=11, va="center")
+    colours = ScalarMappable(Normalize(-40, 40), "RdBu_r")
+    view = scene3d.View((width, height), scene3d.Camera(-62, 40, (0.0, 0.0, 0.015), 0.36))
+    view.surface(draped.points("tool"), draped.cells("tool"), style.TOOL)
+    for k, name in enumerate(LAYUP):
+        points, cells = draped.points(name), draped.cells(name)
+        lift = (k + 1) * OVER_PLY
+        view.surface(points, cells, paint(np.degrees(draped.at_points(name, "shear_angle")), colours), lift=lift)
+        view.lines(points[scene3d.rim(cells)], LAYUP[name], 2.0, lift=lift + 0.5 * OVER_PLY)
+    style.put(axes, view.picture(), width, 30)
+    style.colour_bar(figure, (width + 60, height + 45, 420, 20), colours, "shear angle (deg)", ticks=[-40, -20, 0, 20, 40])
+    return style.save_png(figure, "new-part", [colours])

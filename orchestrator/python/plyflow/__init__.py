@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .artifact import Artifact, Body, FieldInfo, Number, Values
     from .build import Material, Scene, Workflow, diaphragm, ply, schema
     from .errors import Damaged, Finding, InvalidInput, Locked, MissingPackage, NotFound, PlyflowError, RunFailed, Stopped
+    from .exporting import Exported, export
     from .laws import Law, law
     from .running import Event, run
     from .runs import Run, Step, Store
@@ -32,10 +33,10 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
-    "Artifact", "Body", "Cancelled", "Damaged", "Event", "FieldInfo", "Finding", "InvalidInput", "Law", "Locked", "Material", "MissingPackage",
-    "NotFound", "Number", "PlyflowError", "Refused", "Run", "RunFailed", "Scene", "Step", "StepRun", "Stopped", "Store", "Study", "Values",
-    "Workflow", "__version__", "declare", "diaphragm", "include_folder", "law", "material", "open", "ply", "program", "run", "schema", "step",
-    "templates_folder", "workflows_folder",
+    "Artifact", "Body", "Cancelled", "Damaged", "Event", "Exported", "FieldInfo", "Finding", "InvalidInput", "Law", "Locked", "Material",
+    "MissingPackage", "NotFound", "Number", "PlyflowError", "Refused", "Run", "RunFailed", "Scene", "Step", "StepRun", "Stopped", "Store", "Study",
+    "Values", "Workflow", "__version__", "declare", "diaphragm", "export", "include_folder", "law", "material", "open", "ply", "program", "run",
+    "schema", "step", "templates_folder", "workflows_folder",
 ]  # fmt: skip
 
 # In which module each name is. It is imported when the name is used: the command `plyflow` must not wait for numpy.
@@ -44,6 +45,7 @@ _MODULES = {
     "artifact": ("Artifact", "Body", "FieldInfo", "Number", "Values"),
     "build": ("Material", "Scene", "Workflow", "diaphragm", "ply", "schema"),
     "errors": ("Damaged", "Finding", "InvalidInput", "Locked", "MissingPackage", "NotFound", "PlyflowError", "RunFailed", "Stopped"),
+    "exporting": ("Exported", "export"),
     "laws": ("Law", "law"),
     "running": ("Event", "run"),
     "runs": ("Run", "Step", "Store"),

@@ -192,3 +192,43 @@ def test_a_package_that_is_missing_is_named_with_how_to_install_it(demo: Path) -
     for call, package in (("run.results()", "pandas"), ("run.defects()", "pandas"), ("run['coarse']['ply_1'].to_pyvista()", "pyvista")):
         done = subprocess.run([sys.executable, "-c", code + call], capture_output=True, text=True, check=False)
         assert f"pip install {package}" in done.stderr and "MissingPackage" in done.stderr, done.stderr
+
+
+def test_an_export_writes_what_the_command_does_and_tells_of_it(run: plyflow.Run, demo: Path, tmp_path: Path) -> None:
+    made = plyflow.export(demo, ["csv", "dxf"], step="coarse", to=tmp_path / "a", bodies=["ply_1"], unit="mm")
+    assert isinstance(made, plyflow.Exported)
+    assert [f.name for f in made.files] == ["coarse-ply_1-points.csv", "coarse-ply_1-cells.csv", "coarse-flat.dxf", "coarse-draped.dxf"]
+    words = ["export", demo, "coarse", "--format", "csv,dxf", "--body", "ply_1", "--unit", "mm", "--to", tmp_path / "b"]
+    subprocess.run([plyflow.program(), *words], check=True, capture_output=True)
+    for file in made.files:
+        assert file.read_bytes() == (tmp_path / "b" / file.name).read_bytes(), file.name
+    with made.files[0].open(newline="") as table:
+        rows = list(csv.DictReader(table))
+    points = np.array([[float(row[f"{axis} (mm)"]) for axis in "xyz"] for row in rows])
+    assert points == pytest.approx(1e3 * np.asarray(run["coarse"]["ply_1"].points), rel=1e-6, abs=1e-6)
+
+    # A step of a run knows its artifact; what is there already with the same content is told as well.
+    step = plyflow.export(run["coarse"], "csv", to=tmp_path / "a", bodies="ply_1", unit="mm")
+    assert [f.name for f in step.files] == [f.name for f in made.files[:2]]
+    made.files[0].write_text("mine", encoding="utf-8")
+    with pytest.raises(plyflow.NotFound, match="in the way"):
+        plyflow.export(run["coarse"], "csv", to=tmp_path / "a", bodies=["ply_1"], unit="mm")
+    assert made.files[0].read_text(encoding="utf-8") == "mine"
+    plyflow.export(run["coarse"], "csv", to=tmp_path / "a", bodies=["ply_1"], unit="mm", force=True)
+    assert made.files[0].read_bytes() == (tmp_path / "b" / made.files[0].name).read_bytes()
+
+
+def test_what_cannot_be_exported_is_told(run: plyflow.Run, demo: Path, tmp_path: Path) -> None:
+    with pytest.raises(plyflow.NotFound, match="ply_9"):
+        plyflow.export(demo, "csv", step="coarse", to=tmp_path, bodies=["ply_9"])
+    with pytest.raises(plyflow.NotFound, match="there is no file"):
+        plyflow.export(tmp_path / "none.yaml", "csv", step="coarse")
+    with pytest.raises(plyflow.PlyflowError, match="for a workflow file"):
+        plyflow.export(run["coarse"], "csv", step="coarse")
+    with pytest.raises(plyflow.PlyflowError, match="is empty"):
+        plyflow.export(run["coarse"], [])
+    with pytest.raises(plyflow.PlyflowError, match="stl"):
+        plyflow.export(run["coarse"], "stl", to=tmp_path)
+    with pytest.raises(plyflow.PlyflowError, match="--net"):
+        plyflow.export(run["coarse"], "dxf", net="20", to=tmp_path)
+    assert not any(tmp_path.iterdir())

@@ -7,7 +7,7 @@ mod places;
 mod trust;
 
 pub use cluster::{ClusterArgs, PilotArgs};
-pub use export::{ExportArgs, ExportFormat, ExportUnit};
+pub use export::{ExportArgs, ExportFormat, ExportUnit, Printed};
 pub use new::{NewArgs, NewKind, StudyProcess, StudyWords};
 pub use places::Places;
 pub use trust::TrustArgs;

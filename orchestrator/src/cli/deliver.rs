@@ -31,11 +31,31 @@ pub fn unfit(name: &str) -> Option<&'static str> {
     }
 }
 
-/// Writes all files or, when one is in the way, none; says what was done.
+/// A file that lies in the folder now.
+#[derive(Debug, PartialEq)]
+pub struct Written {
+    /// Its path, from the current folder.
+    pub path: Utf8PathBuf,
+    /// Its size.
+    pub bytes: u64,
+    /// Whether it was not there before, with the same content.
+    pub new: bool,
+}
+
+/// What was done, for people.
+pub fn told(all: &[Written]) -> String {
+    let one = |w: &Written| {
+        let what = if w.new { "" } else { ", as it was" };
+        format!("{}: {}{what}\n", w.path, bytes(w.bytes))
+    };
+    all.iter().map(one).collect()
+}
+
+/// Writes all files or, when one is in the way, none; tells of each.
 ///
 /// # Errors
 /// [`exit::USAGE`] when something else is in the way, [`exit::INTERNAL`] when a disk fails.
-pub fn write_all(files: &[Ready], folder: &Utf8Path, force: bool) -> Result<String, Stop> {
+pub fn write_all(files: &[Ready], folder: &Utf8Path, force: bool) -> Result<Vec<Written>, Stop> {
     let mut todo: Vec<(Utf8PathBuf, &Ready, bool)> = Vec::new();
     let mut in_the_way = Vec::new();
     for file in files {
@@ -71,16 +91,15 @@ pub fn write_all(files: &[Ready], folder: &Utf8Path, force: bool) -> Result<Stri
     }
     std::fs::create_dir_all(folder)
         .map_err(Stop::machine(format!("making the folder {folder}")))?;
-    let mut out = String::new();
+    let mut written = Vec::new();
     for (path, file, new) in todo {
         if new {
             write(&path, &file.content).map_err(Stop::machine(format!("writing {path}")))?;
         }
-        let size = bytes(file.content.len() as u64);
-        let what = if new { "" } else { ", as it was" };
-        out += &format!("{path}: {size}{what}\n");
+        let bytes = file.content.len() as u64;
+        written.push(Written { path, bytes, new });
     }
-    Ok(out)
+    Ok(written)
 }
 
 /// Under a temporary name first, so that a whole file is there at any moment.
@@ -111,11 +130,11 @@ mod tests {
         let to = dir.join("new/folder");
         let all = [file("a", "1\n"), file("b", "2\n")];
         assert_eq!(
-            write_all(&all, &to, false).unwrap(),
+            told(&write_all(&all, &to, false).unwrap()),
             format!("{to}/a: 2 B\n{to}/b: 2 B\n")
         );
         // The same content is no reason to stop.
-        assert!(write_all(&all, &to, false).unwrap().contains("as it was"));
+        assert!(told(&write_all(&all, &to, false).unwrap()).contains("as it was"));
         std::fs::write(to.join("b"), "mine").unwrap();
         std::fs::remove_file(to.join("a")).unwrap();
         let stop = write_all(&all, &to, false).unwrap_err();

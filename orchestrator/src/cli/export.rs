@@ -1,7 +1,7 @@
 //! `export`: formed plies as files of other programs.
 
-use super::args::{ExportArgs, ExportFormat, ExportUnit, Places, Workflow};
-use super::deliver::{Ready, write_all};
+use super::args::{ExportArgs, ExportFormat, ExportUnit, Places, Printed, Workflow};
+use super::deliver::{self, Ready, write_all};
 use super::inspect::{artifact_of, record_of};
 use super::open::open;
 use crate::exit;
@@ -10,7 +10,7 @@ use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_artifact::Artifact;
 use plyflow_export::{ExportError, Format, Frames, LengthUnit, Request};
 use plyflow_model::units::{Dimension, parse_quantity};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 /// `plyflow export`.
 ///
@@ -61,11 +61,20 @@ pub fn export(args: &ExportArgs) -> Done {
         told.extend(new);
     }
     let folder = args.to.as_deref().unwrap_or(Utf8Path::new("."));
-    let mut out = write_all(&files, folder, args.force)?;
-    for sentence in told {
-        out += &format!("note: {sentence}\n");
+    let written = write_all(&files, folder, args.force)?;
+    match args.print {
+        Printed::Text => {
+            let notes: String = told.iter().map(|t| format!("note: {t}\n")).collect();
+            print(&(deliver::told(&written) + &notes))
+        }
+        Printed::Json => {
+            let files: Vec<Value> = written
+                .iter()
+                .map(|w| json!({"path": w.path, "bytes": w.bytes, "new": w.new}))
+                .collect();
+            print(&format!("{}\n", json!({"files": files, "notes": told})))
+        }
     }
-    print(&out)
 }
 
 /// What a command line can mend is told as such.

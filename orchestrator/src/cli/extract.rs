@@ -1,7 +1,7 @@
 //! `extract`: writes the files that an artifact carries.
 
 use super::args::ExtractArgs;
-use super::deliver::{Ready, unfit, write_all};
+use super::deliver::{Ready, told, unfit, write_all};
 use super::inspect::artifact_of;
 use super::open::open;
 use super::table::{bytes, table};
@@ -41,7 +41,7 @@ pub fn extract(args: &ExtractArgs) -> Done {
     }
     let here = Utf8Path::new(".");
     let folder = args.to.as_deref().unwrap_or(here);
-    print(&write_all(&files, folder, args.force)?)
+    print(&told(&write_all(&files, folder, args.force)?))
 }
 
 /// Why the files of an artifact cannot be used.

@@ -85,12 +85,7 @@ fn new_study(args: &NewArgs, folder: &Utf8Path) -> Done {
         study::files(args, folder, answers)?
     };
     write(folder, &files)?;
-    // A workflow with a step in Python is valid where its packages are installed, which may come later.
-    let file = match args.study.dxf {
-        Some(_) => "scene.yaml",
-        None => "workflow.yaml",
-    };
-    validate(&typed_validate(&folder.join(file))?).map_err(|stop| {
+    validate(&typed_validate(&folder.join("workflow.yaml"))?).map_err(|stop| {
         let text = format!(
             "{}{folder}: it was written, and has errors: correct them there",
             stop.text

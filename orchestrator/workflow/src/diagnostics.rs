@@ -267,9 +267,15 @@ pub struct SetText {
 }
 
 impl Source {
-    /// Line (from 1) of a place in the file.
-    pub fn line(&self, span: &Span) -> usize {
-        line_column(&self.text, span.start).0
+    /// In which line (from 1) a place of the tree stands, in words; with the file, where it comes from another one.
+    pub fn line(&self, span: &Span) -> String {
+        let (text, name, start) = self.origin(span);
+        let line = line_column(&text, span.start.saturating_sub(start)).0;
+        match name {
+            Some(name) if name != self.name => format!("in line {line} of {name}"),
+            Some(_) => format!("in line {line}"),
+            None => "in what `--set` gives".to_owned(),
+        }
     }
 
     /// Adds a text of the command line and returns the place of its first byte.

@@ -4,7 +4,7 @@
 use crate::check::{Checker, repeated_keys};
 use crate::diagnostics::{Mention, Problems, Source};
 use crate::draft::Draft;
-use crate::parameters::{named, unreadable};
+use crate::named::{named, unreadable};
 use crate::resolved::{Expectation, FamilyExpectation};
 use crate::results::{declared, value};
 use crate::study::Asked;

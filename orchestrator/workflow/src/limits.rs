@@ -100,6 +100,11 @@ fn shaped(node: &Node, place: &LimitPlace, source: &Source, problems: &mut Probl
         let d = problems.add(source, &shape.value.span, message);
         d.given(format!("input: {name}"));
         d.expected("a list of points, [[x, y], ..], or {circle: {radius: ..}}");
+    } else if place.polygon.as_ref().is_some_and(|p| p.unread().is_some()) {
+        let message = "the polygon of a limit cannot come from a drawing";
+        let d = problems.add(source, &shape.value.span, message);
+        d.expected("a list of points, [[x, y], ..], or {circle: {radius: ..}}");
+        d.help("name a region of the scene whose polygon is that drawing");
     } else if let Some(Err(e)) = place.corners() {
         let message = format!("`{}` {e}", shape.key);
         problems

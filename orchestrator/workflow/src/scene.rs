@@ -3,8 +3,10 @@
 use crate::check::{Checker, repeated_keys};
 use crate::diagnostics::{Mention, Problems, Source};
 use crate::hints::other_format;
-use crate::parameters::{Place, Resolver, find, named, unreadable};
+use crate::named::{named, unreadable};
+use crate::parameters::{Place, Resolver, find};
 use crate::paths;
+use crate::plies;
 use crate::scene_rules;
 use crate::text::written;
 use crate::yaml::{Kind, Node, Span};
@@ -165,10 +167,22 @@ pub fn scene_value(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> 
         return None;
     }
     Checker::new(&SCENE, at.source, resolver.problems).check(node, "the scene");
+    let filled = plies::fill(node, at.source, resolver.problems);
+    let at = &match &filled {
+        Some(filled) => Place {
+            source: &filled.source,
+            ..at.clone()
+        },
+        None => at.clone(),
+    };
+    let node = filled.as_ref().map_or(node, |f| &f.scene);
     let found = resolver.problems.places_from(before);
     let tool = stl_file(resolver, node, at);
     let materials = materials(resolver, node, at);
-    scene_rules::tell(node, &materials, &found, at.source, resolver.problems);
+    // Rules look at all sheets: without those of a book that could not be read they would find what is none.
+    if filled.as_ref().is_none_or(|f| f.sound) {
+        scene_rules::tell(node, &materials, &found, at.source, resolver.problems);
+    }
     if resolver.problems.count() > before {
         return None;
     }

@@ -124,10 +124,7 @@ fn show(fault: &Fault, scene: &Node, found: &[Span], source: &Source, problems: 
             let there = follow(scene, path);
             there.whole.then(|| there.node.text().map(str::to_owned))?
         }
-        Other::Same(path) => {
-            let line = source.line(&follow(scene, path).node.span);
-            Some(format!("in line {line}"))
-        }
+        Other::Same(path) => Some(source.line(&follow(scene, path).node.span)),
     };
     let key = at.entry.map(|e| &e.key_span);
     let span = match (fault.shown, at.whole) {

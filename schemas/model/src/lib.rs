@@ -5,6 +5,7 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod artifact;
+pub mod book;
 pub mod budget;
 pub mod canonical;
 pub mod contour;

@@ -96,13 +96,13 @@ pub enum OutlineError {
         /// A place where they meet.
         at: Millimetres,
     },
-    /// A contour is made by another step, and has not been read.
-    #[error("{contour} {}", not_read(name))]
+    /// A contour is made by another step or drawn in a file, and has not been read.
+    #[error("{contour} {why}")]
     NotRead {
         /// Where.
         contour: ContourName,
-        /// Its name there.
-        name: String,
+        /// What it is ([`crate::contour::Contour::unread`]).
+        why: String,
     },
     /// Holes without an outline.
     #[error(
@@ -128,13 +128,6 @@ impl OutlineError {
             Self::HolesAlone | Self::TwoSizes => None,
         }
     }
-}
-
-/// Of a contour that another step makes, and that nobody has read: goes on from what it is.
-pub(crate) fn not_read(name: &str) -> String {
-    format!(
-        "is `{name}` of another step, and nothing gives it; expected a step that gives `geometry`, wired to the input `geometry`"
-    )
 }
 
 /// A point (m) that shows itself in mm.

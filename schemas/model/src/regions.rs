@@ -2,9 +2,7 @@
 
 use crate::contour::Contour;
 use crate::friction::Coefficient;
-use crate::outline::{
-    OutlineError, Point, Region, not_read, segment_distance, sides, signed_area, winds,
-};
+use crate::outline::{OutlineError, Point, Region, segment_distance, sides, signed_area, winds};
 use crate::units::{Angle, Length};
 use plyflow_fixed::FixedBits;
 use schemars::JsonSchema;
@@ -28,7 +26,7 @@ pub struct PlyRegion {
     pub name: String,
     /// A polygon (or circle) on the flat ply, relative to the ply's `centre`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("x-expected" = "a list of points, [[x, y], ..], {circle: {radius: ..}}, or {input: NAME} from another step"))]
+    #[schemars(extend("x-expected" = "a list of points, [[x, y], ..], {circle: {radius: ..}}, {drawing: {file: ..}}, or {input: NAME} from another step"))]
     pub polygon: Option<Contour>,
     /// A rectangle instead, each of whose sizes is one number.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -77,8 +75,8 @@ pub enum RegionError {
     /// It has both.
     #[error("has a `polygon` and a `rectangle`; expected one of the two")]
     TwoShapes,
-    /// Its shape is made by another step, and has not been read.
-    #[error("{}", not_read(.0))]
+    /// Its shape is made by another step or drawn in a file, and has not been read.
+    #[error("{0}")]
     NotRead(String),
     /// Its shape bounds nothing.
     #[error("has no area of its own: {}", .0.to_string().replace("outline", "polygon"))]
@@ -89,12 +87,12 @@ impl PlyRegion {
     /// Its corners over the tool (m), for a ply of this centre (m), counter-clockwise.
     ///
     /// # Errors
-    /// When it is no region: without a shape, with two, with one that crosses itself, or with one that another step makes and that has not been
-    /// read.
+    /// When it is no region: without a shape, with two, with one that crosses itself, or with one that another step makes or a file has and
+    /// that has not been read.
     pub fn corners(&self, centre: Point) -> Result<Vec<Point>, RegionError> {
         let own = match (&self.polygon, &self.rectangle) {
-            (Some(polygon), None) => match polygon.input() {
-                Some(name) => return Err(RegionError::NotRead(name.to_owned())),
+            (Some(polygon), None) => match polygon.unread() {
+                Some(why) => return Err(RegionError::NotRead(why)),
                 None => polygon.corners(),
             },
             (None, Some(r)) => {

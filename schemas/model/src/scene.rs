@@ -13,7 +13,8 @@ use plyflow_fixed::FixedBits;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use crate::contour::{Circle, Contour, NamedContour};
+pub use crate::book::PlyBook;
+pub use crate::contour::{Circle, Contour, Drawing, NamedContour};
 pub use crate::process::{
     DoubleDiaphragm, Hold, Holder, Press, PressPlate, PressureAt, PressureCourse, PressureTable,
     Process, Towards, WeightDirection,
@@ -40,7 +41,8 @@ pub struct Scene {
     pub description: Option<String>,
     /// The rigid tool.
     pub tool: Tool,
-    /// Sheets in the order of the stack, the one nearest the tool first.
+    /// Sheets in the order of the stack, the one nearest the tool first. The plies of a ply book may stand among them.
+    #[schemars(with = "Vec<SheetEntry>")]
     pub sheets: Vec<Sheet>,
     /// Coulomb coefficients by pair of surfaces.
     pub friction: Friction,
@@ -49,6 +51,25 @@ pub struct Scene {
     /// Mirror planes of everything above: explicit forming computes the part with x >= 0 (y >= 0) and writes the whole.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub symmetry: Vec<MirrorPlane>,
+}
+
+/// What may stand in a scene's list of sheets.
+// A `Scene` has only sheets: who resolves a scene puts the plies of a book in the place of the words that ask for them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum SheetEntry {
+    /// One sheet.
+    Sheet(Box<Sheet>),
+    /// The plies of a ply book, in its order.
+    Book(Box<BookEntry>),
+}
+
+/// The plies of a ply book.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BookEntry {
+    /// The book, and what its rows leave open.
+    pub plies: PlyBook,
 }
 
 /// A mirror plane through the tool's axis.
@@ -101,7 +122,7 @@ pub struct Sheet {
     pub width: Option<Length>,
     /// Plies, instead of length and width: the outline before forming, relative to `centre`. One of another step brings its holes along.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("x-expected" = "a list of points, [[x, y], ..], {circle: {radius: ..}}, or {input: NAME} from another step"))]
+    #[schemars(extend("x-expected" = "a list of points, [[x, y], ..], {circle: {radius: ..}}, {drawing: {file: ..}}, or {input: NAME} from another step"))]
     pub outline: Option<Contour>,
     /// Plies with an outline: holes in it, relative to `centre`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -125,7 +146,7 @@ impl Sheet {
     /// The region of a sheet with an `outline`, over the tool; `None` for a sheet without one.
     ///
     /// # Errors
-    /// When outline and holes bound no region, stand beside `length` and `width`, or are made by another step and have not been read.
+    /// When outline and holes bound no region, stand beside `length` and `width`, or are made by another step or drawn in a file and have not been read.
     pub fn region(&self) -> Result<Option<Region>, OutlineError> {
         let Some(outline) = &self.outline else {
             return match self.holes.is_empty() {
@@ -149,14 +170,14 @@ impl Sheet {
         Region::new(placed(outline), self.holes.iter().map(placed).collect()).map(Some)
     }
 
-    /// The first of its contours that another step makes and that has not been read.
+    /// The first of its contours that another step makes, or that is drawn in a file, and that has not been read.
     fn not_read(&self, outline: &Contour) -> Option<OutlineError> {
         let holes = self.holes.iter().enumerate();
         let all = holes.map(|(i, hole)| (ContourName::Hole(i), hole));
         let mut all = std::iter::once((ContourName::Outline, outline)).chain(all);
         all.find_map(|(contour, c)| {
-            let name = c.input()?.to_owned();
-            Some(OutlineError::NotRead { contour, name })
+            let why = c.unread()?;
+            Some(OutlineError::NotRead { contour, why })
         })
     }
 

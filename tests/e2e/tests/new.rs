@@ -141,7 +141,7 @@ fn a_new_study_of_a_tool_in_aircraft_coordinates_is_valid_and_is_draped() {
     assert_eq!(none.status.code(), Some(2));
     let said = text(&none.stderr);
     assert!(
-        said.contains("--unit UNIT, --ply SIZE or --dxf FILE, --material NAME|FILE")
+        said.contains("--unit UNIT, --ply SIZE, --dxf FILE or --plies BOOK, --material NAME|FILE")
             && said.contains("mm in ft"),
         "{said}"
     );

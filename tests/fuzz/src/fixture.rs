@@ -91,6 +91,11 @@ impl Folder {
             "materials/fabric.yaml",
             "film.yaml",
             "points.csv",
+            "workflow-plies.yaml",
+            "scene-plies.yaml",
+            "plies.csv",
+            "ply.dxf",
+            "corners.csv",
             "expected.json",
             "tool.stl",
         ] {

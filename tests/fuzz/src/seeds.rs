@@ -22,6 +22,8 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
             b"coarse.element_size=8 mm\ndefects.over_shear_positive='9 deg'\n".to_vec(),
             b"coarse.scene.friction.fabric_fabric=0.1\ncoarse.scene.sheets.ply-1.fibre_1=-45 deg\ncoarse.damping=null".to_vec(),
         ],
+        "ply-book" => vec![std::fs::read(fixture("plies.csv")).unwrap_or_default()],
+        "drawing" => read(vec![fixture("ply.dxf"), fixture("corners.csv"), REPOSITORY.join("workflows/files-of-others/blank.dxf")]),
         "quantity" => texts(&["5 mm", "-1.5e3 kPa", "45 °", "112.19 N/m", "20 °C", "1e-9 1/s2", "50 %", "3", "1/4 in"]),
         "expression" => texts(&[
             "-135 deg + ${angle}",

@@ -97,6 +97,62 @@ const STL: [&str; 14] = [
     "end loop",
 ];
 
+const BOOK: [&str; 16] = [
+    "name",
+    "angle",
+    "material",
+    "outline",
+    "layer",
+    "x [mm]",
+    "y [mm]",
+    "rotation",
+    "note",
+    "ply.dxf",
+    "corners.csv",
+    "woven",
+    "45 deg",
+    "90",
+    "0.5 rad",
+    "PLY",
+];
+
+const DXF: [&str; 34] = [
+    "SECTION",
+    "ENDSEC",
+    "HEADER",
+    "$INSUNITS",
+    "BLOCKS",
+    "BLOCK",
+    "ENDBLK",
+    "ENTITIES",
+    "EOF",
+    "INSERT",
+    "LINE",
+    "ARC",
+    "CIRCLE",
+    "ELLIPSE",
+    "SPLINE",
+    "LWPOLYLINE",
+    "POLYLINE",
+    "VERTEX",
+    "SEQEND",
+    "REGION",
+    "TEXT",
+    "PLY",
+    "  0\n",
+    " 10\n",
+    " 20\n",
+    " 40\n",
+    " 42\n",
+    " 50\n",
+    " 70\n",
+    "230\n",
+    "-1\n",
+    "1e6\n",
+    "x [mm],y [mm]",
+    "contour",
+];
+
 const EXPRESSIONS: [&str; 24] = [
     "${angle}", "${mu}", "${layup}", "${on}", " and ", " or ", "not ", "min(", "max(", "abs(",
     "sqrt(", "sin(", "<=", ">=", "==", "!=", " deg", " N/m", " m^-2", "^", "(", ")", "'L4'",
@@ -128,6 +184,8 @@ pub fn of(target: &str) -> Vec<String> {
     match target {
         "table" | "profile" | "scan-points" | "points" => add(&CELLS),
         "stl" | "scan-facets" => add(&STL),
+        "ply-book" => add(&[&CELLS[..], &BOOK].concat()),
+        "drawing" => add(&[&CELLS[..], &DXF].concat()),
         "expression" => add(&EXPRESSIONS),
         _ => {}
     }

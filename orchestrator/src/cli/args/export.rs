@@ -45,6 +45,9 @@ pub struct ExportArgs {
     /// Replace files that are there with another content
     #[arg(long)]
     pub force: bool,
+    /// How it is told what was written
+    #[arg(long, value_enum, default_value = "text")]
+    pub print: Printed,
     #[command(flatten)]
     /// Where things are.
     pub places: Places,
@@ -79,4 +82,13 @@ pub enum ExportUnit {
     Mm,
     /// Inches
     In,
+}
+
+/// How it is told what was written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Printed {
+    /// A line for each file, and notes
+    Text,
+    /// {"files": [{"path", "bytes", "new"}], "notes": [..]}
+    Json,
 }

@@ -51,15 +51,28 @@ pub struct StudyWords {
     /// Length of one unit of the tool's file: mm, cm, m, in, ft or such as '0.1 mm'
     #[arg(long, value_name = "UNIT", help_heading = "A study")]
     pub unit: Option<String>,
-    /// Length and width of the plies: '400 x 200 mm'; beside --dxf those of the box around the outline, where the drawing does not tell
+    /// Length and width of the plies: '400 x 200 mm'; beside --plies those of plies whose row has no outline
     #[arg(long, value_name = "SIZE", help_heading = "A study")]
     pub ply: Option<String>,
-    /// A DXF drawing with the outline of the plies; a step in Python reads it, which is copied into the study
-    #[arg(long, value_name = "FILE", help_heading = "A study")]
+    /// A DXF drawing (or a CSV table of corners) with the outline of the plies
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with = "ply",
+        help_heading = "A study"
+    )]
     pub dxf: Option<Utf8PathBuf>,
     /// The layer of the drawing with the outline, where several have curves
     #[arg(long, value_name = "LAYER", requires = "dxf", help_heading = "A study")]
     pub layer: Option<String>,
+    /// A ply book: a CSV table with a row for each ply, from the tool upwards: name, angle, material, outline, layer, x, y, rotation
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with_all = ["dxf", "angles"],
+        help_heading = "A study"
+    )]
+    pub plies: Option<Utf8PathBuf>,
     /// A material file, or the name of one that comes along, such as woven-38616: it is copied
     #[arg(long, value_name = "NAME|FILE", help_heading = "A study")]
     pub material: Option<String>,
@@ -86,6 +99,7 @@ impl StudyWords {
             (self.ply.is_some(), "--ply"),
             (self.dxf.is_some(), "--dxf"),
             (self.layer.is_some(), "--layer"),
+            (self.plies.is_some(), "--plies"),
             (self.material.is_some(), "--material"),
             (!self.angles.is_empty(), "--angles"),
             (self.process.is_some(), "--process"),

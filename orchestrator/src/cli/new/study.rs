@@ -1,8 +1,8 @@
 //! `new study`: a scene and a workflow for a part of one's own, from an answer to each of five questions.
 
 mod ask;
-mod drawing;
 mod part;
+mod plies;
 mod sizes;
 mod text;
 mod words;
@@ -15,6 +15,7 @@ use crate::said::Stop;
 use ask::Asker;
 use camino::{Utf8Path, Utf8PathBuf};
 use part::Part;
+use plies::{Book, Named, Plies};
 use plyflow_files::open::{self, MOST_DATA, MOST_WRITTEN};
 use plyflow_files::stl;
 use plyflow_model::units::{Dimension, parse_quantity};
@@ -33,13 +34,18 @@ struct Answers {
     tool: String,
     facets: Vec<[[f64; 3]; 3]>,
     unit: String,
-    ply: [f64; 2],
-    material: String,
+    /// Length and width of plies that are rectangles (m).
+    ply: Option<[f64; 2]>,
+    /// What `--material` says, where it is needed.
+    material: Option<String>,
     process: StudyProcess,
 }
 
-/// The step that reads a drawing: its files, in the folder of the workflows that come along.
-const DXF_STEP: [&str; 2] = ["dxf_outline.py", "dxf_reading.py"];
+/// A material of the plies: how the scene names it, its thickness (m) and its areal mass (kg/m2), where they are known.
+type Material = (String, Sheet);
+
+/// Thickness (m) and areal mass (kg/m2) of a material, where they are known.
+type Sheet = [Option<f64>; 2];
 
 /// The files of a new study by their paths in its folder, and what to say of it.
 ///
@@ -58,29 +64,23 @@ pub fn files(
     let part = Part::new(&of.facets, metres)
         .ok_or_else(|| wrong(format!("--tool {}: its facets have no extent", of.tool)))?;
     let mut files = Vec::new();
-    let (material, sheet) = take_material(&of.material, &materials, folder, &mut files)?;
+    let mut take = |name: &str| take_material(name, &materials, folder, &mut files);
+    let given = of.material.as_deref().map(&mut take).transpose()?;
+    let (plies, sheets) = plies(args, &of, (metres, &unit), folder, given.clone(), &mut take)?;
     if of.process == StudyProcess::DoubleDiaphragm {
         let film = text_of(&materials.join("stretchlon-ht350.yaml"))?;
         files.push((Utf8PathBuf::from(FILM), film));
     }
-    let outline = args.study.dxf.as_deref();
-    let outline = outline.map(|dxf| from_folder(folder, dxf)).transpose()?;
-    if outline.is_some() {
-        for name in DXF_STEP {
-            let text = text_of(&shipped.join("files-of-others").join(name))?;
-            files.push((Utf8PathBuf::from(name), text));
-        }
-    }
+    let known = |k: usize| sheets.iter().filter_map(move |s| s[k]);
     let study = Study {
         name: args.name.clone(),
         tool: from_folder(folder, Utf8Path::new(&of.tool))?,
         unit,
         part,
-        ply: of.ply,
-        outline,
-        layer: args.study.layer.clone(),
-        material,
-        sheet,
+        plies,
+        material: given.map_or(String::new(), |g| g.0),
+        // The thickest, so that it fits into the gaps, and the lightest, so that no mass is added to it.
+        sheet: [known(0).reduce(f64::max), known(1).reduce(f64::min)],
         angles: angles(&args.study.angles)?,
         process: of.process,
     };
@@ -89,6 +89,76 @@ pub fn files(
     files.sort();
     files.dedup();
     Ok((files, told(&study, folder)))
+}
+
+/// The plies, and thickness and areal mass of each of their materials. `unit`: of the tool (m), and as the scene writes it; `given`: the material of
+/// `--material`; `take`: takes a material into the study.
+fn plies(
+    args: &NewArgs,
+    of: &Answers,
+    (metres, unit): (f64, &str),
+    folder: &Utf8Path,
+    given: Option<Material>,
+    take: &mut impl FnMut(&str) -> Result<Material, Stop>,
+) -> Result<(Plies, Vec<Sheet>), Stop> {
+    let mut sheets: Vec<Sheet> = given.iter().map(|g| g.1).collect();
+    let words = &args.study;
+    if let Some(path) = &words.dxf {
+        let layer = words.layer.clone();
+        let (without_unit, size) = plies::drawing(path, layer.as_deref(), metres)?;
+        let drawn = Plies::Drawn {
+            file: from_folder(folder, path)?,
+            layer,
+            unit: without_unit.then(|| unit.to_owned()),
+            size,
+        };
+        return Ok((drawn, sheets));
+    }
+    let Some(path) = &words.plies else {
+        let size = of
+            .ply
+            .ok_or_else(|| Stop::new(exit::INTERNAL, "an answer is missing"))?;
+        return Ok((Plies::Rectangles(size), sheets));
+    };
+    let read = plies::read(path, of.ply, metres)?;
+    let mut materials = Vec::new();
+    for named in plies::materials(path, &read.rows).0 {
+        match named {
+            Named::File(file) => sheets.push(sheet_of(&text_of(&file)?)),
+            Named::Name(name) => {
+                let taken = of_name(path, &name, given.as_ref(), take)?;
+                sheets.push(taken.1);
+                materials.push((name, taken.0));
+            }
+        }
+    }
+    let book = Book {
+        file: from_folder(folder, path)?,
+        unit: read.without_unit.then(|| unit.to_owned()),
+        read,
+        size: of.ply,
+        material: given.map(|g| g.0),
+        materials,
+    };
+    Ok((Plies::Book(book), sheets))
+}
+
+/// What a name of a book's material stands for: one that comes along, or the one of `--material`.
+fn of_name(
+    book: &Utf8Path,
+    name: &str,
+    given: Option<&Material>,
+    take: &mut impl FnMut(&str) -> Result<Material, Stop>,
+) -> Result<Material, Stop> {
+    take(name).or_else(|stop| {
+        given.cloned().ok_or_else(|| {
+            let why = stop.text.trim_start_matches(&format!("--material {name}: "));
+            let text = format!(
+                "{book}: the material `{name}`: {why}. Or say with --material what names that are no file stand for"
+            );
+            Stop::new(stop.code, text)
+        })
+    })
 }
 
 /// The answers: those that are given, and for the others those of who is asked.
@@ -105,11 +175,14 @@ fn answered(
     let question = format!("Which unit does it have?{}", in_units(&facets));
     let unit = given.unit.as_deref();
     let unit = asker.value(unit, "--unit UNIT", &question, Some("mm"))?;
-    let ply = ply(args, &mut asker)?;
+    let (ply, needs_material) = ply(args, &mut asker)?;
     let names = shipped_names(materials).join(", ");
     let question = format!("Which material: a file, or one of {names}?");
     let material = given.material.as_deref();
-    let material = asker.value(material, "--material NAME|FILE", &question, None)?;
+    let material = match needs_material || material.is_some() {
+        true => asker.value(material, "--material NAME|FILE", &question, None)?,
+        false => None,
+    };
     let process = asker.process(given)?;
     asker.complete().map_err(|stop| match (&unit, &tool) {
         (None, Some(_)) => {
@@ -118,8 +191,8 @@ fn answered(
         }
         _ => stop,
     })?;
-    match (tool, unit, ply, material) {
-        (Some(tool), Some(unit), Some(ply), Some(material)) => Ok(Answers {
+    match (tool, unit) {
+        (Some(tool), Some(unit)) => Ok(Answers {
             tool,
             facets,
             unit,
@@ -131,34 +204,33 @@ fn answered(
     }
 }
 
-/// Length and width of the plies, or of the box around their outline (m). `None` where they are missing and nobody answers.
-fn ply(args: &NewArgs, asker: &mut Asker<'_>) -> Result<Option<[f64; 2]>, Stop> {
+/// Length and width of plies that are rectangles (m), and whether `--material` is needed. `None` where there are no such plies, or where the answer is
+/// missing and nobody gives it.
+fn ply(args: &NewArgs, asker: &mut Asker<'_>) -> Result<(Option<[f64; 2]>, bool), Stop> {
     let wrong = |text: String| Stop::new(exit::USAGE, text);
     let words = &args.study;
-    if let (Some(dxf), None) = (&words.dxf, &words.ply) {
-        let bytes = open::read(dxf.as_std_path(), MOST_DATA)
-            .map_err(|e| wrong(format!("--dxf {dxf}: {e}; expected a DXF drawing")))?;
-        let text = String::from_utf8_lossy(&bytes);
-        let size = drawing::size(&text, words.layer.as_deref());
-        return size.map(Some).ok_or_else(|| {
-            let what = match &words.layer {
-                Some(layer) => format!("its curves on the layer `{layer}`"),
-                None => "its curves".to_owned(),
-            };
-            wrong(format!(
-                "--dxf {dxf}: nothing tells how large {what} are, or in which unit ($INSUNITS); expected a text DXF with lines, arcs or polylines \
-                 outside of blocks. Say how large the box around the outline is with --ply, such as --ply '400 x 200 mm'"
-            ))
-        });
-    }
-    if let Some(dxf) = words.dxf.as_ref().filter(|d| !d.is_file()) {
-        return Err(wrong(format!("--dxf {dxf}: there is no such file")));
+    let read = |size: Option<String>| size.map(|s| words::ply(&s).map_err(wrong)).transpose();
+    if words.dxf.is_some() {
+        return Ok((None, true));
     }
     let question = "How large are the plies, such as '400 x 200 mm'?";
-    let option = "--ply SIZE or --dxf FILE";
+    if let Some(book) = &words.plies {
+        let rows = plies::rows(book)?;
+        let (_, without) = plies::materials(book, &rows);
+        let size = match (&words.ply, rows.iter().any(|r| r.outline.is_none())) {
+            (given, false) => given.clone(),
+            (given, true) => {
+                let option = "--ply SIZE (of the plies whose row has no outline)";
+                let question =
+                    "How large are the plies whose row has no outline, such as '400 x 200 mm'?";
+                asker.value(given.as_deref(), option, question, None)?
+            }
+        };
+        return Ok((read(size)?, without));
+    }
+    let option = "--ply SIZE, --dxf FILE or --plies BOOK";
     let size = asker.value(words.ply.as_deref(), option, question, None)?;
-    size.map(|size| words::ply(&size).map_err(wrong))
-        .transpose()
+    Ok((read(size)?, true))
 }
 
 /// What is said of a study that has been written.
@@ -171,22 +243,21 @@ fn told(study: &Study, folder: &Utf8Path) -> String {
             study.part.words.join(", ")
         ),
     };
-    let (trust, needs) = match study.outline {
-        Some(_) => (
-            " --trust",
-            " The drawing is read by dxf_outline.py, which lies in the folder now: `--trust` lets it run, and it needs a Python with `numpy`, `ezdxf` \
-             and `shapely` (docs/guide/files-of-others.md).",
-        ),
-        None => ("", ""),
-    };
     let whole = match study.process {
         StudyProcess::DoubleDiaphragm => "coarse",
         StudyProcess::Press => "formed",
     };
+    let plies = match &study.plies {
+        Plies::Book(book) => format!(
+            " The book has {} plies: scene.yaml names it, so what you change in it counts.",
+            book.read.rows.len()
+        ),
+        _ => String::new(),
+    };
     format!(
-        "The tool is {x} long, {y} wide and {z} high; {placed}. Go on with\n\n  cd {}\n  plyflow run{trust} workflow.yaml --until drape    # a second: does \
-         it stand as it should?\n  plyflow run{trust} workflow.yaml --until {whole}   # the whole part\n  plyflow run{trust} workflow.yaml\n\nEach ends with the path of its report. \
-         scene.yaml says what was guessed.{needs}\n",
+        "The tool is {x} long, {y} wide and {z} high; {placed}.{plies} Go on with\n\n  cd {}\n  plyflow run workflow.yaml --until drape    # a second: does \
+         it stand as it should?\n  plyflow run workflow.yaml --until {whole}   # the whole part\n  plyflow run workflow.yaml\n\nEach ends with the path of its report. \
+         scene.yaml says what was guessed.\n",
         quoted(folder.as_str())
     )
 }
@@ -257,7 +328,7 @@ fn take_material(
     materials: &Utf8Path,
     folder: &Utf8Path,
     files: &mut Vec<(Utf8PathBuf, String)>,
-) -> Result<(String, [Option<f64>; 2]), Stop> {
+) -> Result<Material, Stop> {
     let path = Utf8PathBuf::from(given);
     let shipped = materials.join(format!("{given}.yaml"));
     let path = match path.is_file() {
@@ -278,17 +349,7 @@ fn take_material(
         );
         return Err(Stop::new(exit::USAGE, text));
     }
-    let value = |key: &str, dimension| {
-        let line = text
-            .lines()
-            .find_map(|l| l.strip_prefix(key)?.strip_prefix(':'))?;
-        let bare = line.split(" #").next()?.trim();
-        parse_quantity(bare, dimension).ok()
-    };
-    let sheet = [
-        value("thickness", Dimension::Length),
-        value("areal_mass", Dimension::ArealMass),
-    ];
+    let sheet = sheet_of(&text);
     let names_files = text.contains("./") || text.contains("file:");
     let name = path.file_name().unwrap_or("material.yaml");
     if names_files {
@@ -297,6 +358,21 @@ fn take_material(
     let place = format!("materials/{name}");
     files.push((Utf8PathBuf::from(&place), text.clone()));
     Ok((place, sheet))
+}
+
+/// Thickness (m) and areal mass (kg/m2) of a material's text, where they stand in lines of their own.
+fn sheet_of(text: &str) -> Sheet {
+    let value = |key: &str, dimension| {
+        let line = text
+            .lines()
+            .find_map(|l| l.strip_prefix(key)?.strip_prefix(':'))?;
+        let bare = line.split(" #").next()?.trim();
+        parse_quantity(bare, dimension).ok()
+    };
+    [
+        value("thickness", Dimension::Length),
+        value("areal_mass", Dimension::ArealMass),
+    ]
 }
 
 /// The path of a file as it is named from a folder that may not be there yet.

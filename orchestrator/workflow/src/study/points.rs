@@ -3,7 +3,7 @@
 //! A little over 600 lines: each way to write points is a function, and all end in one table.
 
 use crate::diagnostics::{Mention, Problems, Source};
-use crate::parameters::{named, unreadable};
+use crate::named::{named, unreadable};
 use crate::study::told::{in_one_unit, is_column, report, within};
 use crate::yaml::{Entry, Kind, Node, Span};
 use plyflow_files::number::{Decimal, Signs};

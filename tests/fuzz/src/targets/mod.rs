@@ -1,6 +1,7 @@
 //! The readers, each as a function of the bytes of a file.
 
 mod artifacts;
+mod drawings;
 mod manifests;
 mod store;
 mod surfaces;
@@ -59,13 +60,15 @@ impl Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 20] = [
+pub const TARGETS: [Target; 22] = [
     Target::of_text("workflow", workflows::workflow),
     Target::of_text("scene", workflows::scene),
     Target::of_text("material", workflows::material),
     Target::of_text("expected", workflows::expected),
     Target::of_text("points", workflows::points),
     Target::of_text("override", workflows::overrides),
+    Target::of_text("ply-book", drawings::book),
+    Target::of_text("drawing", drawings::drawing),
     Target::of_bytes("quantity", words::quantity),
     Target::of_bytes("expression", words::expression),
     Target::of_text("table", tables::table),

@@ -26,7 +26,7 @@ fn sound(folder: &Folder, path: &Utf8Path, first: &Resolution) {
     assert_eq!(kept, Some((again.workflow, recipes)), "kept as another");
 }
 
-fn load(folder: &Folder, workflow: &str, written: &Utf8Path, bytes: &[u8]) {
+pub(super) fn load(folder: &Folder, workflow: &str, written: &Utf8Path, bytes: &[u8]) {
     let path = folder.path(workflow);
     match resolve(&path, &*CATALOG, &[]) {
         Ok(found) => sound(folder, &path, &found),

@@ -26,10 +26,10 @@ pub struct Elements {
     pub zone: f64,
 }
 
-/// Elements of a bag: what the whole is formed with, and its zones.
-pub fn elements(part: &Part, ply: [f64; 2]) -> (Elements, [Chosen; 2]) {
+/// Elements of a bag: what the whole is formed with, and its zones. `least`: the least length or width of a ply (m).
+pub fn elements(part: &Part, least: f64) -> (Elements, [Chosen; 2]) {
     // A joggle spar of 200 mm with plies of 300 mm is formed well enough by membranes of 8 to 16 mm for a first look.
-    let across = part.size[0].min(part.size[1]).min(ply[0]).min(ply[1]);
+    let across = part.size[0].min(part.size[1]).min(least);
     let whole = (1e3 * across / 12.0).round().clamp(4.0, 16.0) * 1e-3;
     let half = 0.5 * whole;
     let wanted = part.radius.map_or(half, |r| (0.4 * r).min(half));
@@ -102,20 +102,20 @@ mod tests {
 
     #[test]
     fn elements_follow_the_part_and_its_roundings_and_stay_within_bounds() {
-        let of = |size, radius, ply| elements(&part(size, radius), ply).0;
-        let hat = of([0.3, 0.12, 0.04], Some(0.008), [0.4, 0.2]);
+        let of = |size, radius, least| elements(&part(size, radius), least).0;
+        let hat = of([0.3, 0.12, 0.04], Some(0.008), 0.2);
         assert_eq!(
             [hat.whole, hat.zone].map(|s| (1e4 * s).round()),
             [100.0, 30.0]
         );
-        let large = of([2.0, 1.0, 0.1], Some(0.1), [2.2, 1.4]);
+        let large = of([2.0, 1.0, 0.1], Some(0.1), 1.4);
         assert_eq!(
             [large.whole, large.zone].map(|s| (1e4 * s).round()),
             [160.0, 80.0]
         );
-        let sharp = elements(&part([0.3, 0.12, 0.04], None), [0.4, 0.2]);
+        let sharp = elements(&part([0.3, 0.12, 0.04], None), 0.2);
         assert!(sharp.1[1].why.contains("no roundings"), "{:?}", sharp.1);
-        let fine = elements(&part([0.3, 0.12, 0.04], Some(0.001)), [0.4, 0.2]);
+        let fine = elements(&part([0.3, 0.12, 0.04], Some(0.001)), 0.2);
         assert_eq!(
             (1e4 * fine.0.zone).round(),
             25.0,

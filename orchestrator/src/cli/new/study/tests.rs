@@ -50,6 +50,7 @@ fn args(root: &Utf8Path) -> NewArgs {
             ply: Some("400 x 200 mm".into()),
             dxf: None,
             layer: None,
+            plies: None,
             material: Some(root.join("cloth.yaml").into()),
             angles: vec![45.0, -45.0],
             process: None,
@@ -148,7 +149,7 @@ fn what_is_missing_or_wrong_is_told_with_what_would_do() {
         let nothing = told(&|w| *w = StudyWords::default());
         assert!(
             nothing.contains(
-                "--tool FILE, --unit UNIT, --ply SIZE or --dxf FILE, --material NAME|FILE"
+                "--tool FILE, --unit UNIT, --ply SIZE, --dxf FILE or --plies BOOK, --material NAME|FILE"
             ),
             "{nothing}"
         );
@@ -192,7 +193,7 @@ fn on_a_terminal_it_asks_and_shows_how_large_the_tool_would_be() {
 }
 
 #[test]
-fn an_outline_of_a_drawing_is_read_by_a_step_that_comes_along() {
+fn an_outline_of_a_drawing_stands_in_the_scene_and_needs_no_step() {
     with_files(|root| {
         let shipped = shipped::workflows().unwrap().join("files-of-others");
         let mut args = args(root);
@@ -200,33 +201,140 @@ fn an_outline_of_a_drawing_is_read_by_a_step_that_comes_along() {
         args.study.layer = Some("PLY".into());
         let (files, told) = files(&args, &root.join("new"), None).unwrap();
         let scene = file(&files, "scene.yaml");
-        assert!(
-            scene.contains("outline: {input: outline}") && !scene.contains("width: 200"),
+        assert_eq!(
+            scene
+                .matches("files-of-others/blank.dxf, layer: PLY, centred: true}}")
+                .count(),
+            2,
             "{scene}"
         );
+        assert!(!scene.contains("    length: "), "{scene}");
         let workflow = file(&files, "workflow.yaml");
-        assert!(workflow.contains("plugin: ./dxf_outline.py"), "{workflow}");
-        assert!(
-            workflow.contains("blank.dxf, layers: {outline: PLY}, centred: true}"),
-            "{workflow}"
-        );
-        assert_eq!(workflow.matches("geometry: blank").count(), 3, "{workflow}");
-        assert!(
-            workflow.contains("from: {boundary: boundary, geometry: blank}"),
-            "{workflow}"
-        );
-        assert!(file(&files, "dxf_outline.py").contains("dxf-outline"));
-        assert!(file(&files, "dxf_reading.py").contains("ezdxf"));
-        assert!(
-            told.contains("run --trust workflow.yaml --until drape"),
-            "{told}"
-        );
+        assert!(!workflow.contains("geometry:"), "{workflow}");
+        assert!(!told.contains("trust"), "{told}");
         args.study.layer = Some("GONE".into());
         let stop = super::files(&args, &root.join("new"), None).unwrap_err();
         assert!(
-            stop.text.contains("on the layer `GONE`") && stop.text.contains("--ply '400"),
+            stop.text
+                .contains("blank.dxf:1:1: there is no curve on the layer `GONE`"),
             "{}",
             stop.text
+        );
+        // Where the drawing does not say its unit, the tool's is a guess that the scene names.
+        let drawing = std::fs::read_to_string(shipped.join("blank.dxf")).unwrap();
+        let bare = drawing.replace("$INSUNITS", "$OTHER");
+        assert_ne!(bare, drawing);
+        let path = root.join("bare.dxf");
+        std::fs::write(&path, bare).unwrap();
+        (args.study.dxf, args.study.layer) = (Some(path), None);
+        let (files, _) = super::files(&args, &root.join("new"), None).unwrap();
+        let scene = file(&files, "scene.yaml");
+        assert!(
+            scene.contains("unit: 1 mm, centred") && scene.contains("A guess: `unit`"),
+            "{scene}"
+        );
+    });
+}
+
+/// A book of three plies with two outlines beside it, one of them a table without units, far from the tool.
+fn book(root: &Utf8Path) -> Utf8PathBuf {
+    let drawing = "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n4\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n0\nLWPOLYLINE\n8\nA\n70\n1\n10\n0\n20\n0\n10\n400\n20\n0\n10\n400\n20\n200\n10\n0\n20\n200\n0\nENDSEC\n";
+    std::fs::create_dir_all(root.join("plies")).unwrap();
+    std::fs::write(root.join("plies/skin.dxf"), drawing).unwrap();
+    std::fs::write(
+        root.join("plies/cap.csv"),
+        "x,y\n0,0\n300,0\n300,60\n0,60\n",
+    )
+    .unwrap();
+    let table = "name,material,angle,outline,x [mm],y [mm],rotation\n\
+                 skin,AS4,45,skin.dxf,12000,4000,\n\
+                 cap,woven-38616,-45 deg,cap.csv,12200,4050,90\n\
+                 strip,,0,,12200,4100,\n";
+    let path = root.join("plies/book.csv");
+    std::fs::write(&path, table).unwrap();
+    path
+}
+
+#[test]
+fn a_ply_book_stands_in_the_scene_with_what_it_leaves_open() {
+    with_files(|root| {
+        let mut args = args(root);
+        (args.study.plies, args.study.angles) = (Some(book(root)), Vec::new());
+        args.study.ply = Some("350 x 80 mm".into());
+        let (files, told) = files(&args, &root.join("new"), None).unwrap();
+        let scene = file(&files, "scene.yaml");
+        for says in [
+            "  - plies:\n      book: ../plies/book.csv\n",
+            "      material: materials/cloth.yaml\n",
+            // One name comes along, and the other stands for what is given.
+            "      materials: {AS4: materials/cloth.yaml, woven-38616: materials/woven-38616.yaml}\n",
+            "      length: 350 mm\n      width: 80 mm\n",
+            "      unit: 1 mm\n",
+            // The box of all is from (12000, 4000) to (12400, 4350).
+            "      centre: [-12200 mm, -4175 mm]\n",
+            "name: lower_film",
+            "name: upper_film",
+        ] {
+            assert!(scene.contains(says), "{says}\n{scene}");
+        }
+        assert!(!scene.contains("fibre_1"), "{scene}");
+        assert!(file(&files, "materials/woven-38616.yaml").contains("plyflow_material"));
+        // The narrowest ply is 60 mm wide.
+        let workflow = file(&files, "workflow.yaml");
+        assert!(workflow.contains("element_size: 5 mm"), "{workflow}");
+        assert!(told.contains("The book has 3 plies"), "{told}");
+        args.study.process = Some(StudyProcess::Press);
+        let (files, _) = super::files(&args, &root.join("new"), None).unwrap();
+        assert!(file(&files, "scene.yaml").contains("plies:\n      book:"));
+    });
+}
+
+#[test]
+fn what_is_wrong_with_a_book_or_left_open_is_told_with_its_place() {
+    with_files(|root| {
+        let mut args = args(root);
+        let path = book(root);
+        (args.study.plies, args.study.angles) = (Some(path.clone()), Vec::new());
+        let told = |args: &NewArgs| {
+            let stop = files(args, &root.join("new"), None).unwrap_err();
+            assert_eq!(stop.code, exit::USAGE, "{}", stop.text);
+            stop.text
+        };
+        (args.study.ply, args.study.material) = (None, None);
+        let open = told(&args);
+        assert!(
+            open.contains(
+                "needs --ply SIZE (of the plies whose row has no outline), --material NAME|FILE"
+            ),
+            "{open}"
+        );
+        args.study.ply = Some("350 x 80 mm".into());
+        args.study.material = Some("woven-38616".into());
+        let of = |table: &str| {
+            std::fs::write(&path, table).unwrap();
+            told(&args)
+        };
+        for (table, says) in [
+            ("name,angle\na,steep\n", "book.csv:2:3: `angle` is `steep`"),
+            (
+                "name,angle,outline\na,0,gone.dxf\n",
+                "book.csv:2:5: cannot read `gone.dxf`: there is no such file",
+            ),
+            (
+                "name,angle,outline,layer\na,0,skin.dxf,B\n",
+                "skin.dxf:1:1: there is no curve on the layer `B`",
+            ),
+        ] {
+            let text = of(table);
+            assert!(text.contains(says), "{text}");
+        }
+        std::fs::write(&path, "name,angle,material,outline\na,0,wool,skin.dxf\n").unwrap();
+        args.study.material = None;
+        let wool = told(&args);
+        assert!(
+            wool.contains("the material `wool`: there is no such file")
+                && wool.contains("--material"),
+            "{wool}"
         );
     });
 }

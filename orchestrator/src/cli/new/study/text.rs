@@ -1,6 +1,7 @@
 //! The files of a new study.
 
 use super::part::Part;
+use super::plies::{Book, Plies};
 use super::sizes;
 use super::words::{mm, quoted};
 use crate::cli::args::StudyProcess;
@@ -17,21 +18,21 @@ pub struct Study {
     pub unit: String,
     /// What the file tells.
     pub part: Part,
-    /// Length and width of the plies, or of the box around their outline (m).
-    pub ply: [f64; 2],
-    /// The drawing with their outline, from the study's folder.
-    pub outline: Option<String>,
-    /// The layer on which it is drawn, where that has to be said.
-    pub layer: Option<String>,
-    /// The plies' material file, from the study's folder.
+    /// The plies.
+    pub plies: Plies,
+    /// Their material file, from the study's folder; of a book that of rows without one.
     pub material: String,
-    /// Its thickness (m) and areal mass (kg/m2), where they are known.
+    /// Thickness (m) of the thickest and areal mass (kg/m2) of the lightest material, where they are known.
     pub sheet: [Option<f64>; 2],
-    /// Direction of each ply's first fibres (deg).
+    /// Direction of each ply's first fibres (deg), where they are of no book.
     pub angles: Vec<f64>,
     /// How it is formed.
     pub process: StudyProcess,
 }
+
+/// Of files that do not say their unit.
+const NO_UNIT: &str =
+    "A guess: `unit`, as a drawing does not say in which unit it is. It is the tool's.";
 
 /// The films' material file, from the study's folder.
 pub const FILM: &str = "materials/stretchlon-ht350.yaml";
@@ -66,15 +67,42 @@ impl Study {
         if bag {
             text += &film("lower_film");
         }
+        text += &match &self.plies {
+            Plies::Book(book) => self.book(book),
+            _ => self.listed(),
+        };
+        if bag {
+            text += &film("upper_film");
+        }
+        text + "\n" + &if bag { self.bag() } else { self.press() }
+    }
+
+    /// A ply for each angle.
+    fn listed(&self) -> String {
+        let mut text = String::new();
+        let size = match &self.plies {
+            Plies::Drawn {
+                file, layer, unit, ..
+            } => {
+                let mut words = vec![format!("file: {}", quoted(file))];
+                words.extend(layer.iter().map(|l| format!("layer: {}", quoted(l))));
+                words.extend(unit.iter().map(|u| format!("unit: {u}")));
+                words.push("centred: true".to_owned());
+                if unit.is_some() {
+                    text += &comment(2, NO_UNIT);
+                }
+                text += &comment(
+                    2,
+                    "The middle of the outline is moved to (0, 0); `centre` of a ply moves it over the tool.",
+                );
+                format!("outline: {{drawing: {{{}}}}}", words.join(", "))
+            }
+            plies => {
+                let [length, width] = plies.extent(self.part.size).0;
+                format!("length: {}\n    width: {}", mm(length), mm(width))
+            }
+        };
         for (k, angle) in self.angles.iter().enumerate() {
-            let size = match self.outline {
-                Some(_) => "outline: {input: outline}".to_owned(),
-                None => format!(
-                    "length: {}\n    width: {}",
-                    mm(self.ply[0]),
-                    mm(self.ply[1])
-                ),
-            };
             let _ = write!(
                 text,
                 "  - name: ply_{}\n    kind: ply\n    material: {}\n    {size}\n    fibre_1: {angle} deg\n    fibre_2: {} deg\n",
@@ -83,10 +111,49 @@ impl Study {
                 angle + 90.0
             );
         }
-        if bag {
-            text += &film("upper_film");
+        text
+    }
+
+    /// The plies of a book.
+    fn book(&self, book: &Book) -> String {
+        let mut text = comment(
+            2,
+            "The plies of the book, its first row nearest to the tool. Angles count from x, counter-clockwise as seen from above.",
+        );
+        let _ = writeln!(text, "  - plies:\n      book: {}", quoted(&book.file));
+        if let Some(material) = &book.material {
+            text += &comment(6, "Of rows without a material.");
+            let _ = writeln!(text, "      material: {}", quoted(material));
         }
-        text + "\n" + &if bag { self.bag() } else { self.press() }
+        if !book.materials.is_empty() {
+            let names = book.materials.iter();
+            let names: Vec<String> = names
+                .map(|(n, f)| format!("{}: {}", quoted(n), quoted(f)))
+                .collect();
+            text += &comment(6, "What the names of the book stand for.");
+            let _ = writeln!(text, "      materials: {{{}}}", names.join(", "));
+        }
+        if let Some([length, width]) = book.size {
+            text += &comment(6, "Of rows without an outline.");
+            let _ = writeln!(
+                text,
+                "      length: {}\n      width: {}",
+                mm(length),
+                mm(width)
+            );
+        }
+        if let Some(unit) = &book.unit {
+            text += &comment(6, NO_UNIT);
+            let _ = writeln!(text, "      unit: {unit}");
+        }
+        if let Some([x, y]) = book.read.centre(self.part.size) {
+            text += &comment(
+                6,
+                "A guess: the plies are drawn elsewhere, so the middle of the box around them is moved over the middle of the tool.",
+            );
+            let _ = writeln!(text, "      centre: [{}, {}]", mm(x), mm(y));
+        }
+        text
     }
 
     fn tool_text(&self) -> String {
@@ -111,8 +178,9 @@ impl Study {
     }
 
     fn bag(&self) -> String {
-        let (frame, reason) = sizes::frame(&self.part, self.ply);
-        let (elements, _) = sizes::elements(&self.part, self.ply);
+        let (extent, least) = self.plies.extent(self.part.size);
+        let (frame, reason) = sizes::frame(&self.part, extent);
+        let (elements, _) = sizes::elements(&self.part, least);
         let [lowering, drawing] = sizes::durations(&self.part);
         let mut text = comment(
             0,
@@ -146,7 +214,10 @@ impl Study {
     }
 
     fn press(&self) -> String {
-        let plies = self.angles.len() as f64;
+        let plies = match &self.plies {
+            Plies::Book(book) => book.read.rows.len() as f64,
+            _ => self.angles.len() as f64,
+        };
         let thickness = self.sheet[0].unwrap_or(1e-3);
         // Rounded up to half a millimetre.
         let up = |m: f64| (2e3 * m - 1e-6).ceil() * 0.5e-3;
@@ -187,50 +258,18 @@ impl Study {
         }
     }
 
-    /// The step that reads the drawing, if there is one.
-    fn blank(&self) -> String {
-        let Some(dxf) = &self.outline else {
-            return String::new();
-        };
-        let layer = self.layer.as_deref().map(quoted);
-        let layers = layer.map_or(String::new(), |l| format!(", layers: {{outline: {l}}}"));
+    fn drape(&self, size: &str) -> String {
         comment(
             2,
-            "The outline of the plies, its middle moved to (0, 0). `centre` of a ply in the scene moves it over the tool.",
+            "In a second: geometry alone shows where the plies shear, and whether the tool stands as it should.",
         ) + &format!(
-            "  blank:\n    plugin: ./dxf_outline.py\n    with: {{file: {}{layers}, centred: true}}\n",
-            quoted(dxf)
+            "  drape:\n    plugin: forming-kinematic\n    with: {{scene: scene.yaml, element_size: {size}}}\n"
         )
     }
 
-    /// What a step that forms over the scene takes besides.
-    fn wires(&self, others: &str) -> String {
-        let geometry = self.outline.as_ref().map(|_| "geometry: blank");
-        let all: Vec<&str> = [others]
-            .into_iter()
-            .filter(|o| !o.is_empty())
-            .chain(geometry)
-            .collect();
-        match all.is_empty() {
-            true => String::new(),
-            false => format!("    from: {{{}}}\n", all.join(", ")),
-        }
-    }
-
-    fn drape(&self, size: &str) -> String {
-        self.blank()
-            + &comment(
-                2,
-                "In a second: geometry alone shows where the plies shear, and whether the tool stands as it should.",
-            )
-            + &format!(
-                "  drape:\n    plugin: forming-kinematic\n{}    with: {{scene: scene.yaml, element_size: {size}}}\n",
-                self.wires("")
-            )
-    }
-
     fn bag_steps(&self) -> String {
-        let (_, [whole, zone]) = sizes::elements(&self.part, self.ply);
+        let least = self.plies.extent(self.part.size).1;
+        let (_, [whole, zone]) = sizes::elements(&self.part, least);
         let mut text = self.drape(&whole.value);
         text += &comment(
             2,
@@ -241,8 +280,7 @@ impl Study {
         );
         let _ = writeln!(
             text,
-            "  coarse:\n    plugin: forming-explicit\n{}    with: {{scene: scene.yaml, element: m4, element_size: {}}}",
-            self.wires(""),
+            "  coarse:\n    plugin: forming-explicit\n    with: {{scene: scene.yaml, element: m4, element_size: {}}}",
             whole.value
         );
         text += &comment(
@@ -260,10 +298,9 @@ impl Study {
         let _ = write!(
             text,
             "  boundary:\n    plugin: boundary-interpolation\n    for_each: {{zone: zones}}\n    from: {{formed: coarse, zones: zones}}\n    with: {{element_size: {}, cut_stiffness: 10 MPa}}\n\
-             \x20 local:\n    plugin: forming-explicit\n    for_each: {{zone: zones}}\n{}    with: {{scene: scene.yaml, element: rf4}}\n\
+             \x20 local:\n    plugin: forming-explicit\n    for_each: {{zone: zones}}\n    from: {{boundary: boundary}}\n    with: {{scene: scene.yaml, element: rf4}}\n\
              \x20 comparison:\n    plugin: comparison\n    from: {{global: coarse, zones: zones, local: local, others: drape}}\n",
-            zone.value,
-            self.wires("boundary: boundary")
+            zone.value
         );
         text + &expected(&[
             (
@@ -288,7 +325,8 @@ impl Study {
     }
 
     fn press_steps(&self) -> String {
-        let (elements, [whole, _]) = sizes::elements(&self.part, self.ply);
+        let least = self.plies.extent(self.part.size).1;
+        let (elements, [whole, _]) = sizes::elements(&self.part, least);
         let size = elements.zone.max(0.5 * elements.whole);
         let mass = self.sheet[1].unwrap_or(0.5);
         let mut text = self.drape(&whole.value);
@@ -302,10 +340,9 @@ impl Study {
         );
         let _ = write!(
             text,
-            "  formed:\n    plugin: forming-explicit\n{}    with:\n      scene: scene.yaml\n      element: {{plugin: rf4, with: {{hourglass_floor: 100 N/m, thickening: 2}}}}\n      \
+            "  formed:\n    plugin: forming-explicit\n    with:\n      scene: scene.yaml\n      element: {{plugin: rf4, with: {{hourglass_floor: 100 N/m, thickening: 2}}}}\n      \
              element_size: {}\n      time_step: {} us\n      least_areal_mass: {mass} kg/m2\n      contact_augmentation: 0\n\
              \x20 defects:\n    plugin: defect-measurement\n    from: {{formed: formed}}\n",
-            self.wires(""),
             mm(size),
             // What the hemisphere's ply of the same kind is run with.
             (5e3 * size).round() / 10.0

@@ -1,0 +1,551 @@
+//! The words of a scene that stand for files: the plies of a ply book, and contours that are drawn in a file. What the files say takes the place of
+//! these words in the tree, as if it were written there; each value still knows where in which file it stands.
+
+use crate::diagnostics::{Mention, Problems, Source};
+use crate::evidence;
+use crate::named::{named, unreadable};
+use crate::yaml::{Entry, Kind, Node, Span};
+use camino::{Utf8Path, Utf8PathBuf};
+use plyflow_files::book::{self, Row};
+use plyflow_files::dxf::{Contours, Fineness, MOST_DRAWN};
+use plyflow_files::flaw::{Flaw, plain};
+use plyflow_files::open::{self, MOST_WRITTEN};
+use plyflow_files::table::{Amount, Cell};
+use plyflow_files::text::shown;
+use plyflow_files::{drawn, turn};
+use plyflow_model::book::PlyBook;
+use plyflow_model::contour::{Contour, Drawing};
+use plyflow_model::outline::Point;
+use plyflow_model::units::{Angle, Dimension, Length, si_number, si_text};
+use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_2;
+use std::rc::Rc;
+use std::sync::Arc;
+
+/// A scene with sheets and corners in the place of files.
+pub(crate) struct Filled {
+    /// Its tree.
+    pub scene: Node,
+    /// What the tree's places are in.
+    pub source: Source,
+    /// Whether all files could be read. What is wrong with them has been reported.
+    pub sound: bool,
+}
+
+/// A text that has been read, and where its places are counted on from.
+type Text = (Arc<String>, usize);
+
+struct Filler<'p> {
+    problems: &'p mut Problems,
+    source: Source,
+    texts: BTreeMap<Utf8PathBuf, Option<Text>>,
+    drawings: BTreeMap<String, Option<Rc<Contours>>>,
+    sound: bool,
+}
+
+/// What a ply book's entry in the scene says, and where.
+struct Entered<'n> {
+    node: &'n Node,
+    book: PlyBook,
+    /// The folder of the book, as the scene writes it.
+    folder: Utf8PathBuf,
+    /// Where the places of the book are counted on from.
+    base: usize,
+}
+
+/// Puts what files say into a scene; `None` where it names none of them.
+pub(crate) fn fill(scene: &Node, source: &Source, problems: &mut Problems) -> Option<Filled> {
+    let sheets = scene.get("sheets").map_or(&[][..], Node::items);
+    if !sheets.iter().any(names_files) {
+        return None;
+    }
+    let mut filler = Filler {
+        problems,
+        source: source.clone(),
+        texts: BTreeMap::new(),
+        drawings: BTreeMap::new(),
+        sound: true,
+    };
+    let mut filled = Vec::new();
+    for sheet in sheets {
+        match sheet.get("plies") {
+            Some(plies) => filler.book(plies, &mut filled),
+            None => {
+                let mut sheet = sheet.clone();
+                filler.contours_of(&mut sheet);
+                filled.push(sheet);
+            }
+        }
+    }
+    let mut scene = scene.clone();
+    if let Some(entry) = entry_mut(&mut scene, "sheets") {
+        entry.value.kind = Kind::List(filled);
+    }
+    Some(Filled {
+        scene,
+        source: filler.source,
+        sound: filler.sound,
+    })
+}
+
+fn names_files(sheet: &Node) -> bool {
+    let drawn = |c: &Node| c.get("drawing").is_some();
+    let all = |key: &str| sheet.get(key).map_or(&[][..], Node::items).iter();
+    sheet.get("plies").is_some()
+        || sheet.get("outline").is_some_and(drawn)
+        || all("holes").any(drawn)
+        || all("regions").any(|r| r.get("polygon").is_some_and(drawn))
+}
+
+fn entry_mut<'n>(node: &'n mut Node, key: &str) -> Option<&'n mut Entry> {
+    match &mut node.kind {
+        Kind::Map(entries) => entries.iter_mut().rev().find(|e| e.key == key),
+        _ => None,
+    }
+}
+
+fn text(text: impl Into<String>, span: &Span) -> Node {
+    Node {
+        kind: Kind::Text(text.into()),
+        span: span.clone(),
+    }
+}
+
+fn list(items: Vec<Node>, span: &Span) -> Node {
+    Node {
+        kind: Kind::List(items),
+        span: span.clone(),
+    }
+}
+
+fn length(metres: f64, span: &Span) -> Node {
+    text(si_text(metres, Dimension::Length), span)
+}
+
+/// Corners as a scene lists them.
+fn corners(points: &[Point], span: &Span) -> Node {
+    let point = |p: &Point| list(p.map(|v| length(v, span)).to_vec(), span);
+    list(points.iter().map(point).collect(), span)
+}
+
+fn moved(span: &Span, base: usize) -> Span {
+    span.start + base..span.end.max(span.start) + base
+}
+
+impl Filler<'_> {
+    fn tell(&mut self, flaw: &Flaw, base: usize) {
+        self.sound = false;
+        let span = moved(&flaw.span, base);
+        let d = self.problems.add(&self.source, &span, flaw.problem.clone());
+        if let Some(expected) = &flaw.expected {
+            d.expected(expected.clone());
+        }
+        if let Some(help) = &flaw.help {
+            d.help(help.clone());
+        }
+    }
+
+    /// Says at a place of the tree what is wrong there.
+    fn wrong(&mut self, span: &Span, message: String, expected: &str) {
+        self.sound = false;
+        let d = self.problems.add(&self.source, span, message);
+        d.expected(expected);
+    }
+
+    /// The text of a file that is named at a place of the tree.
+    fn text(&mut self, file: &str, span: &Span, most: u64) -> Option<Text> {
+        let path = named(self.problems, &self.source.folder, file);
+        if let Some(known) = self.texts.get(&path) {
+            self.sound &= known.is_some();
+            return known.clone();
+        }
+        let read = self.read(&path, (file, span), most);
+        self.sound &= read.is_some();
+        self.texts.insert(path, read.clone());
+        read
+    }
+
+    fn read(&mut self, path: &Utf8Path, (file, span): (&str, &Span), most: u64) -> Option<Text> {
+        let bytes = match open::read(path.as_std_path(), most) {
+            Ok(bytes) => bytes,
+            Err(e) => {
+                let mention = Mention::new(&self.source, span, file);
+                unreadable(self.problems, &mention, path, &e);
+                return None;
+            }
+        };
+        self.problems.note_file(path, &evidence::hash(&bytes));
+        let text = match most {
+            MOST_DRAWN => drawn::text(&bytes),
+            _ => plain(&bytes),
+        };
+        match text {
+            Ok(text) => {
+                let text = Arc::new(text);
+                let base = self.source.add_text(text.clone(), Some(path.to_owned()));
+                Some((text, base))
+            }
+            Err(why) => {
+                let message = format!("cannot read `{}`: {why}", shown(file));
+                self.problems.add(&self.source, span, message);
+                None
+            }
+        }
+    }
+
+    /// The contours of a drawing that is named at a place of the tree.
+    fn contours(&mut self, drawing: &Drawing, span: &Span) -> Option<Rc<Contours>> {
+        let key = format!("{drawing:?}");
+        if let Some(known) = self.drawings.get(&key) {
+            return known.clone();
+        }
+        let found = self.text(&drawing.file, span, MOST_DRAWN);
+        let found = found.and_then(|(text, base)| {
+            let default = Fineness::default();
+            let fine = Fineness {
+                tolerance: drawing.tolerance.map_or(default.tolerance, Length::si),
+                chord: drawing.chord.map_or(default.chord, Length::si),
+            };
+            let unit = drawing.unit.map(Length::si);
+            match drawn::read(&text, drawing.layer.as_deref(), unit, fine) {
+                Ok(found) => Some(Rc::new(match drawing.centred {
+                    true => found.centred(),
+                    false => found,
+                })),
+                Err(flaws) => {
+                    for flaw in flaws {
+                        self.of_drawing(flaw, &drawing.file, span, base);
+                    }
+                    None
+                }
+            }
+        });
+        self.sound &= found.is_some();
+        self.drawings.insert(key, found.clone());
+        found
+    }
+
+    /// Tells what is wrong with a drawing: in its line, or, where it is about all of the file, where that is named.
+    fn of_drawing(&mut self, flaw: Flaw, file: &str, span: &Span, base: usize) {
+        if !flaw.span.is_empty() || flaw.span.start > 0 {
+            return self.tell(&flaw, base);
+        }
+        let problem = format!("`{}`: {}", shown(file), flaw.problem);
+        let span = span.clone();
+        self.tell(
+            &Flaw {
+                span,
+                problem,
+                ..flaw
+            },
+            0,
+        );
+    }
+
+    /// What a node `{drawing: {..}}` names; the schema check has spoken about one that is none.
+    fn drawing(&mut self, contour: &Node) -> Option<Rc<Contours>> {
+        let node = contour.get("drawing")?;
+        let Ok(drawing) = serde_json::from_value::<Drawing>(node.to_json()) else {
+            self.sound = false;
+            return None;
+        };
+        let span = node.get("file").map_or(&node.span, |f| &f.span).clone();
+        self.contours(&drawing, &span)
+    }
+
+    /// Puts corners in the place of all drawings of a sheet.
+    fn contours_of(&mut self, sheet: &mut Node) {
+        if let Some(entry) = entry_mut(sheet, "holes")
+            && let Kind::List(holes) = &mut entry.value.kind
+        {
+            holes.iter_mut().for_each(|hole| self.plain_contour(hole));
+        }
+        if let Some(entry) = entry_mut(sheet, "regions")
+            && let Kind::List(regions) = &mut entry.value.kind
+        {
+            for region in regions {
+                if let Some(polygon) = entry_mut(region, "polygon") {
+                    self.plain_contour(&mut polygon.value);
+                }
+            }
+        }
+        let Some(entry) = entry_mut(sheet, "outline") else {
+            return;
+        };
+        let Some(found) = self.drawing(&entry.value) else {
+            return;
+        };
+        let (span, key_span) = (entry.value.span.clone(), entry.key_span.clone());
+        entry.value.kind = corners(&found.outline, &span).kind;
+        let holes: Vec<Node> = found.holes.iter().map(|h| corners(h, &span)).collect();
+        if holes.is_empty() {
+            return;
+        }
+        // Behind those that the scene lists.
+        if let Some(entry) = entry_mut(sheet, "holes") {
+            if let Kind::List(all) = &mut entry.value.kind {
+                all.extend(holes);
+            }
+        } else if let Kind::Map(entries) = &mut sheet.kind {
+            entries.push(Entry {
+                key: "holes".into(),
+                key_span,
+                value: list(holes, &span),
+            });
+        }
+    }
+
+    /// A contour that has no holes of its own.
+    fn plain_contour(&mut self, contour: &mut Node) {
+        let Some(found) = self.drawing(contour) else {
+            return;
+        };
+        if !found.holes.is_empty() {
+            let message = format!(
+                "the drawing has {} contours inside of the largest one",
+                found.holes.len()
+            );
+            let span = contour.span.clone();
+            self.wrong(
+                &span,
+                message,
+                "one contour, as only the outline of a ply has holes",
+            );
+        }
+        contour.kind = corners(&found.outline, &contour.span).kind;
+    }
+
+    /// Adds the plies of a book.
+    fn book(&mut self, node: &Node, sheets: &mut Vec<Node>) {
+        let mut node = node.clone();
+        let Ok(book) = serde_json::from_value::<PlyBook>(node.to_json()) else {
+            // The schema check has spoken.
+            self.sound = false;
+            return;
+        };
+        self.contours_of(&mut node);
+        let span = node.get("book").map_or(&node.span, |b| &b.span).clone();
+        let Some((text, base)) = self.text(&book.book, &span, MOST_WRITTEN) else {
+            return;
+        };
+        let folder = Utf8Path::new(&book.book).parent();
+        let entered = Entered {
+            folder: folder.unwrap_or(Utf8Path::new("")).to_owned(),
+            node: &node,
+            book,
+            base,
+        };
+        match book::read(&text) {
+            Ok(book) => {
+                for row in &book.rows {
+                    let sheet = self.ply(&entered, row);
+                    sheets.extend(sheet);
+                }
+            }
+            Err(flaws) => flaws.iter().for_each(|f| self.tell(f, base)),
+        }
+    }
+
+    /// A row as a sheet; `None` when it is wrong (and reported).
+    fn ply(&mut self, of: &Entered<'_>, row: &Row) -> Option<Node> {
+        let span = moved(&row.span, of.base);
+        let before = self.problems.count();
+        let material = self.material(of, row);
+        let outline = self.shape(of, row);
+        if self.problems.count() > before {
+            return None;
+        }
+        let mut entries = Vec::new();
+        let mut add = |key: &str, value: Node| {
+            entries.push(Entry {
+                key: key.into(),
+                key_span: value.span.clone(),
+                value,
+            });
+        };
+        add(
+            "name",
+            text(&row.name.text, &moved(&row.name.span, of.base)),
+        );
+        add("kind", text("ply", &span));
+        add("material", material?);
+        outline?.into_iter().for_each(|(key, node)| add(key, node));
+        let place = [0, 1].map(|k| self.coordinate(of, row, k));
+        if place.iter().any(Option::is_some) {
+            let place = place.map(|p| p.unwrap_or_else(|| text("0 mm", &span)));
+            add("centre", list(place.to_vec(), &span));
+        }
+        let at = moved(&row.angle.span, of.base);
+        add("fibre_1", text(&row.angle.text, &at));
+        add("fibre_2", text(across(&row.angle), &at));
+        Some(Node {
+            kind: Kind::Map(entries),
+            span,
+        })
+    }
+
+    /// A coordinate of a ply's place, moved as the scene says.
+    fn coordinate(&self, of: &Entered<'_>, row: &Row, k: usize) -> Option<Node> {
+        let own = row.place[k].as_ref();
+        let by = of.book.centre[k].si();
+        let span = own.map_or(&row.span, |a| &a.span);
+        let span = moved(span, of.base);
+        match (own, by == 0.0) {
+            (None, true) => None,
+            (Some(own), true) => Some(text(&own.text, &span)),
+            (None, false) => of.node.get("centre")?.items().get(k).cloned(),
+            // To the picometre, as tools are placed: 10 mm and -100 mm are -90 mm.
+            (Some(own), false) => Some(length(((own.si + by) * 1e12).round() / 1e12, &span)),
+        }
+    }
+
+    fn material(&mut self, of: &Entered<'_>, row: &Row) -> Option<Node> {
+        let Some(cell) = &row.material else {
+            let given = of.node.get("material");
+            if given.is_none() {
+                let message = format!("the ply `{}` has no material", shown(&row.name.text));
+                self.wrong(
+                    &moved(&row.span, of.base),
+                    message,
+                    "one in the column `material`, or `material` beside `book` in the scene",
+                );
+            }
+            return given.cloned();
+        };
+        if let Some(meant) = of.node.get("materials").and_then(|m| m.get(&cell.text)) {
+            return Some(meant.clone());
+        }
+        let (file, span) = self.path(of, cell);
+        let names: Vec<&str> = of.book.materials.keys().map(String::as_str).collect();
+        let there = named(self.problems, &self.source.folder, &file).is_file();
+        if there || (names.is_empty() && Utf8Path::new(&file).extension().is_some()) {
+            return Some(text(file, &span));
+        }
+        let message = format!("there is no material `{}`", shown(&cell.text));
+        self.sound = false;
+        let d = self.problems.add(&self.source, &span, message);
+        d.given(cell.text.clone());
+        match names.is_empty() {
+            true => {
+                d.expected("the path of a material file from the book, or a name that `materials` beside `book` in the scene has");
+            }
+            false => {
+                d.suggest(&cell.text, names);
+                d.expected("a name that `materials` beside `book` in the scene has, or the path of a material file from the book");
+            }
+        }
+        None
+    }
+
+    /// A path of a cell, as the scene would write it, and where it stands.
+    fn path(&self, of: &Entered<'_>, cell: &Cell) -> (String, Span) {
+        let path = of.folder.join(&cell.text);
+        (path.into_string(), moved(&cell.span, of.base))
+    }
+
+    /// Outline and holes of a ply, or its length and width; `None` when they are wrong (and reported).
+    fn shape(&mut self, of: &Entered<'_>, row: &Row) -> Option<Vec<(&'static str, Node)>> {
+        let angle = row.rotation.as_ref().map_or(0.0, |r| r.si);
+        if let Some(cell) = &row.outline {
+            let (file, span) = self.path(of, cell);
+            let drawing = Drawing {
+                file,
+                layer: row.layer.as_ref().map(|l| l.text.clone()),
+                unit: of.book.unit,
+                tolerance: of.book.tolerance,
+                chord: of.book.chord,
+                centred: false,
+            };
+            let found = self.contours(&drawing, &span)?;
+            return Some(shape_of(&found.outline, &found.holes, angle, &span));
+        }
+        let Some(entries) = given_shape(of.node) else {
+            let message = format!("the ply `{}` has no outline", shown(&row.name.text));
+            let expected = "a file in the column `outline`, or `length` and `width`, or `outline`, beside `book` in the scene";
+            self.wrong(&moved(&row.span, of.base), message, expected);
+            return None;
+        };
+        let Some(rotation) = row.rotation.as_ref().filter(|_| angle != 0.0) else {
+            return Some(entries);
+        };
+        let span = moved(&rotation.span, of.base);
+        let read = |node: &Node| serde_json::from_value::<Contour>(node.to_json()).ok();
+        let all: Option<Vec<Contour>> = match (of.book.length, of.book.width) {
+            (Some(l), Some(w)) => Some(vec![rectangle(l, w)]),
+            _ => {
+                let holes = of.node.get("holes").map_or(&[][..], Node::items);
+                of.node
+                    .get("outline")
+                    .into_iter()
+                    .chain(holes)
+                    .map(read)
+                    .collect()
+            }
+        };
+        let all = all?;
+        if all.iter().any(|c| c.unread().is_some()) {
+            let message = "an outline of another step is not turned by `rotation`".to_owned();
+            self.wrong(
+                &span,
+                message,
+                "`rotation` empty or 0, and the outline turned in the step that makes it",
+            );
+            return None;
+        }
+        let mut all = all.iter().map(Contour::corners);
+        let outline = all.next()?;
+        Some(shape_of(&outline, &all.collect::<Vec<_>>(), angle, &span))
+    }
+}
+
+fn rectangle(length: Length, width: Length) -> Contour {
+    let (l, w) = (0.5 * length.si(), 0.5 * width.si());
+    Contour::of(&[[-l, -w], [l, -w], [l, w], [-l, w]])
+}
+
+/// The shape that the scene gives to plies whose row has none.
+fn given_shape(node: &Node) -> Option<Vec<(&'static str, Node)>> {
+    let keys = ["length", "width", "outline", "holes"];
+    let found = keys
+        .into_iter()
+        .filter_map(|k| Some((k, node.get(k)?.clone())));
+    Some(found.collect()).filter(|f: &Vec<_>| !f.is_empty())
+}
+
+fn shape_of(
+    outline: &[Point],
+    holes: &[Vec<Point>],
+    angle: f64,
+    span: &Span,
+) -> Vec<(&'static str, Node)> {
+    let place = |all: &[Point]| -> Node {
+        match angle == 0.0 {
+            true => corners(all, span),
+            false => corners(
+                &all.iter()
+                    .map(|p| turn::turned(*p, angle))
+                    .collect::<Vec<_>>(),
+                span,
+            ),
+        }
+    };
+    let mut shape = vec![("outline", place(outline))];
+    if !holes.is_empty() {
+        shape.push((
+            "holes",
+            list(holes.iter().map(|h| place(h)).collect(), span),
+        ));
+    }
+    shape
+}
+
+/// The direction a quarter turn on from an angle, as a scene writes it.
+fn across(angle: &Amount) -> String {
+    let degrees = ["deg", "\u{b0}"]
+        .iter()
+        .find_map(|u| angle.text.strip_suffix(u)?.trim().parse::<f64>().ok());
+    match degrees {
+        Some(degrees) => format!("{} deg", si_number(degrees + 90.0)),
+        None => Angle(angle.si + FRAC_PI_2).to_string(),
+    }
+}
