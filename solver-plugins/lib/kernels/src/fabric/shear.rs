@@ -3,6 +3,7 @@
 //! Yarns: a law up to its limit angle; beyond it F goes on along its tangent over s (the secant,
 //! where that is steeper), which is convex and finite at |s| = 1.
 
+use super::hysteresis::Slider;
 use super::stitch::Stitch;
 use super::yarn::{Angle, Branch, Law, Polynomial, Response, Signed, Table};
 use crate::{Lanes, asin};
@@ -20,12 +21,18 @@ pub(super) enum Yarn {
 pub(super) struct Shear {
     pub yarn: Yarn,
     pub stitch: Option<Stitch>,
+    pub slider: Option<Slider>,
     initial_slope: f64,
 }
 
 impl Shear {
-    /// The law for g > 0, that for g < 0 over |g| (absent: odd), and the stitch.
-    pub(super) fn new(positive: Branch, negative: Option<Branch>, stitch: Option<Stitch>) -> Self {
+    /// The law for g > 0, that for g < 0 over |g| (absent: odd), the stitch, and the friction of the yarns.
+    pub(super) fn new(
+        positive: Branch,
+        negative: Option<Branch>,
+        stitch: Option<Stitch>,
+        slider: Option<Slider>,
+    ) -> Self {
         let first = positive.initial_slope();
         let initial_slope = negative
             .as_ref()
@@ -38,6 +45,7 @@ impl Shear {
         Self {
             yarn,
             stitch,
+            slider,
             initial_slope,
         }
     }
@@ -53,6 +61,7 @@ impl Shear {
 pub(super) struct ShearOf<'a, L> {
     pub yarn: &'a L,
     pub stitch: Option<&'a Stitch>,
+    pub slider: Option<&'a Slider>,
 }
 
 impl<L: Law> ShearOf<'_, L> {
@@ -124,6 +133,10 @@ impl<L: Law> ShearOf<'_, L> {
             Some(t) => V::select(t.stretched(s), V::splat(t.rise) / a.cosine, zero),
             None => zero,
         };
-        (yarn + stretched, yarn)
+        let bound = yarn + stretched;
+        match self.slider {
+            Some(slider) => (bound + V::splat(slider.stiffness), yarn),
+            None => (bound, yarn),
+        }
     }
 }
