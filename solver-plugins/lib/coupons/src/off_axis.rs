@@ -145,6 +145,8 @@ fn load(
         cycles: p.cycles,
     };
     specimen.model.set_load_factor(0.0);
+    let critical = specimen.model.critical_step().map_err(|e| e.to_string())?;
+    specimen.model.set_step(p.common.step_safety * critical);
     specimen.model.step(true).map_err(|e| e.to_string())?;
     frame(host, specimen, 0.0)?;
     let mut states = vec![State::default()];

@@ -99,23 +99,22 @@ fn membrane_kernel<V: Lanes>(
     energy: &mut [f64],
     stiffness: &mut [f64],
 ) {
-    let (stitch, slider) = (f.shear.stitch.as_ref(), f.shear.slider.as_ref());
+    let stitch = f.shear.stitch.as_ref();
     // Compiled for each kind of yarns and each form.
     macro_rules! of_yarn {
-        ($yarn:expr) => {{
+        ($yarn:expr, $slides:literal) => {{
             let law = ShearOf {
                 yarn: $yarn,
                 stitch,
-                slider,
             };
             match f.form {
                 Form::FibreEnergy => {
-                    fibre_energy::membrane::<V, _>(
+                    fibre_energy::membrane::<V, _, $slides>(
                         f, law, n, metric, history, stress, energy, stiffness,
                     );
                 }
                 Form::Hypoelastic => {
-                    hypoelastic::membrane::<V, _>(
+                    hypoelastic::membrane::<V, _, $slides>(
                         f, law, n, metric, history, stress, energy, stiffness,
                     );
                 }
@@ -123,8 +122,9 @@ fn membrane_kernel<V: Lanes>(
         }};
     }
     match &f.shear.yarn {
-        Yarn::Polynomial(yarn) => of_yarn!(&**yarn),
-        Yarn::Table(yarn) => of_yarn!(yarn),
-        Yarn::Signed(yarn) => of_yarn!(&**yarn),
+        Yarn::Polynomial(yarn) => of_yarn!(&**yarn, false),
+        Yarn::Table(yarn) => of_yarn!(yarn, false),
+        Yarn::Signed(yarn) if f.shear.slider.is_some() => of_yarn!(&**yarn, true),
+        Yarn::Signed(yarn) => of_yarn!(&**yarn, false),
     }
 }

@@ -8,9 +8,10 @@ use crate::{Lanes, WIDTH};
 /// Rows of history with a stitch: largest shear angle, its sine. Those of a slider follow, and then the stitch's are there in any case.
 pub(super) const HISTORY: usize = 2;
 
-/// Stresses and energies from the metric; the history is that of the stitch, `stiffness` may be empty.
+/// Stresses and energies from the metric; the history is that of the stitch, `stiffness` may be empty. `SLIDES`: whether yarns rub, which
+/// is known when it is compiled, as the test for it would cost the others a tenth of their time.
 #[inline(always)]
-pub(super) fn membrane<V: Lanes, L: Law>(
+pub(super) fn membrane<V: Lanes, L: Law, const SLIDES: bool>(
     f: &Fabric,
     law: ShearOf<'_, L>,
     n: usize,
@@ -45,7 +46,7 @@ pub(super) fn membrane<V: Lanes, L: Law>(
         } else {
             law.yarn(s)
         };
-        if let Some(slider) = law.slider {
+        if SLIDES && let Some(slider) = &f.shear.slider {
             let tension = (k1 * d1).max(zero) + (k2 * d2).max(zero);
             let row = |r: usize| (HISTORY + r) * n + c;
             let (stands, lost) = (V::load(history, row(0)), V::load(history, row(1)));
@@ -61,7 +62,10 @@ pub(super) fn membrane<V: Lanes, L: Law>(
         (shear.force * rr).store(stress, 2 * n + c);
         (half * (k1 * d1 * d1 + k2 * d2 * d2) + shear.energy).store(energy, c);
         if !stiffness.is_empty() {
-            let slope = law.slopes(s).0;
+            let mut slope = law.slopes(s).0;
+            if SLIDES && let Some(slider) = &f.shear.slider {
+                slope = slope + V::splat(slider.stiffness);
+            }
             let (a1, a2) = (tension_1 * i1 * r1, tension_2 * i2 * r2);
             let (largest, soft) = tangents(slope, s, i1, i2, a1, a2, shear.force.abs());
             largest.store(stiffness, c);

@@ -25,7 +25,7 @@ const SINE_LIMIT: f64 = 0.985;
 /// Stresses and energies from the metric and the [`HISTORY`]; `stiffness` may be empty.
 /// Long, as it is the loop of a kernel: pieces of it would share most of its values, and its speed would hang on how they are inlined.
 #[inline(always)]
-pub(super) fn membrane<V: Lanes, L: Law>(
+pub(super) fn membrane<V: Lanes, L: Law, const SLIDES: bool>(
     f: &Fabric,
     law: ShearOf<'_, L>,
     n: usize,
@@ -83,7 +83,7 @@ pub(super) fn membrane<V: Lanes, L: Law>(
         let (m2, w2) = fibre(1, row(history, 4), l2, o2, e2);
         // Shear stress of each frame.
         let (mut response, g, gs) = law.with_stitch(s, row(history, 9), row(history, 10));
-        if let Some(slider) = law.slider {
+        if SLIDES && let Some(slider) = &f.shear.slider {
             let tension = m1.max(V::splat(0.0)) + m2.max(V::splat(0.0));
             let slid = slider.at(s, tension, row(history, 11), row(history, 12));
             slid.stands.store(history, HISTORY * n + c);
@@ -91,7 +91,10 @@ pub(super) fn membrane<V: Lanes, L: Law>(
             response.force = response.force + slid.force;
         }
         let q = half * response.force * cosine;
-        let (bound, yarn) = law.slopes(s);
+        let (mut bound, yarn) = law.slopes(s);
+        if SLIDES && let Some(slider) = &f.shear.slider {
+            bound = bound + V::splat(slider.stiffness);
+        }
         let modulus = half * (yarn * cosine - response.force * s / cosine) * cosine;
         let lean = modulus * middle * (e2 - e1);
         let dq = q - row(history, 7);

@@ -38,6 +38,11 @@ impl Shear {
             .as_ref()
             .map_or(first, |n| 0.5 * (first + n.initial_slope()));
         let yarn = match (positive, negative) {
+            // Yarns that rub have one kernel, that of any two laws.
+            (p, n) if slider.is_some() => Yarn::Signed(Box::new(Signed {
+                negative: n.unwrap_or_else(|| p.clone()),
+                positive: p,
+            })),
             (Branch::Polynomial(p), None) => Yarn::Polynomial(p),
             (Branch::Table(t), None) => Yarn::Table(t),
             (positive, Some(negative)) => Yarn::Signed(Box::new(Signed { positive, negative })),
@@ -61,7 +66,6 @@ impl Shear {
 pub(super) struct ShearOf<'a, L> {
     pub yarn: &'a L,
     pub stitch: Option<&'a Stitch>,
-    pub slider: Option<&'a Slider>,
 }
 
 impl<L: Law> ShearOf<'_, L> {
@@ -133,10 +137,6 @@ impl<L: Law> ShearOf<'_, L> {
             Some(t) => V::select(t.stretched(s), V::splat(t.rise) / a.cosine, zero),
             None => zero,
         };
-        let bound = yarn + stretched;
-        match self.slider {
-            Some(slider) => (bound + V::splat(slider.stiffness), yarn),
-            None => (bound, yarn),
-        }
+        (yarn + stretched, yarn)
     }
 }
