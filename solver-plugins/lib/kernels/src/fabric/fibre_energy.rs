@@ -10,6 +10,7 @@ pub(super) const HISTORY: usize = 2;
 
 /// Stresses and energies from the metric; the history is that of the stitch, `stiffness` may be empty. `SLIDES`: whether yarns rub, which
 /// is known when it is compiled, as the test for it would cost the others a tenth of their time.
+/// Long, as it is the loop of a kernel: pieces of it would share most of its values, and its speed would hang on how they are inlined.
 #[inline(always)]
 pub(super) fn membrane<V: Lanes, L: Law, const SLIDES: bool>(
     f: &Fabric,

@@ -397,3 +397,63 @@ fn shear_of_a_material_without_limits_is_not_judged_and_that_is_told() {
     assert!((found.result("over_shear_area") - 0.02).abs() < 1e-12);
     assert_eq!(told(&found), None);
 }
+
+/// Plies of two fabrics: each is judged by its own limits, and the artifact tells of the whole what they share. Of two without limits
+/// one text tells.
+#[test]
+fn each_ply_is_judged_by_the_limits_of_its_own_material() {
+    let mut input = formed(|_, _| OFFSET, |_| f64::to_radians(20.0));
+    let limits = |positive: f64| json!({"positive": f64::to_radians(positive), "negative": f64::to_radians(-50.0)});
+    let sheets = input.attributes["sheets"].as_array_mut().unwrap();
+    let ncf = sheets[1].clone();
+    let more = [
+        ("ply_2", "woven", Some(limits(50.0))),
+        ("ply_3", "cloth", None),
+        ("ply_4", "cloth", None),
+    ];
+    for (name, material, over_shear) in more {
+        let mut sheet = ncf.clone();
+        sheet["name"] = json!(name);
+        sheet["material"] = json!(material);
+        match over_shear {
+            Some(limits) => sheet["over_shear"] = limits,
+            None => drop(sheet.as_object_mut().unwrap().remove("over_shear")),
+        }
+        sheets.push(sheet);
+    }
+    for name in ["ply_2", "ply_3", "ply_4"] {
+        let mut body = input.bodies[1].clone();
+        body.name = name.into();
+        input.bodies.push(body);
+    }
+    let found = detect(&input);
+    let area = |k: usize| {
+        found.attributes["plies"][k]
+            .get("over_shear_area")
+            .and_then(|a| a.as_f64())
+    };
+    assert!((area(0).unwrap() - 0.02).abs() < 1e-12);
+    assert_eq!((area(1), area(2), area(3)), (Some(0.0), None, None));
+    assert!((found.result("over_shear_area") - 0.02).abs() < 1e-12);
+    let thresholds = &found.attributes["thresholds"];
+    assert_eq!(thresholds.get("over_shear_positive"), None);
+    assert_eq!(thresholds.get("over_shear_negative"), None);
+    let told: Vec<&String> = found
+        .log
+        .iter()
+        .filter(|l| l.contains("is not judged"))
+        .collect();
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(
+        told[0].contains("shear of 'ply_3', 'ply_4' is not judged: the material 'cloth'"),
+        "{told:?}"
+    );
+    // Without the two, the plies share their limit of negative shear.
+    let sheets = input.attributes["sheets"].as_array_mut().unwrap();
+    sheets.truncate(3);
+    let found = detect(&input);
+    let thresholds = &found.attributes["thresholds"];
+    assert_eq!(thresholds.get("over_shear_positive"), None);
+    let negative = thresholds["over_shear_negative"].as_f64().unwrap();
+    assert!((negative - f64::to_radians(-50.0)).abs() < 1e-12);
+}
