@@ -73,6 +73,42 @@ def buckling():
     return style.save_svg(figure, "buckling")
 
 
+def unidirectional():
+    """A unidirectional ply that is pulled off its fibres: membranes and the closed form of the law."""
+    place = runs.run("coupons/unidirectional/workflow")
+    figure, panels = plt.subplots(1, 2, figsize=(7, 2.8), layout="constrained")
+    for axes, name, label in zip(panels, ("shear_angle", "strain"), ("shear of the fibres (deg)", "strain along the pull (%)")):
+        unit = 180 / np.pi if name == "shear_angle" else 100
+        for degrees, colour in ((20, BLUE), (45, ORANGE), (70, style.GREEN)):
+            run = runs.artifact(place, f"off_{degrees}")
+            axes.plot(run.array("curves/closed_form/force"), run.array(f"curves/closed_form/{name}") * unit, color=colour, linewidth=1.2,
+                      label=f"{degrees}° off the pull")
+            axes.plot(run.array("curves/run/force"), run.array(f"curves/run/{name}") * unit, "o", color=colour, markersize=3.2,
+                      markerfacecolor="white", markeredgewidth=0.9)
+        axes.set(xlabel="force over the width (N/m)", ylabel=label, xlim=(0, None))
+    panels[0].legend(loc="lower left")
+    return style.save_svg(figure, "unidirectional")
+
+
+def hysteresis():
+    """Loops of shear, of shear under tension and of bending, with friction between the yarns."""
+    place = runs.run("coupons/hysteresis/workflow")
+    figure, (shear, bending) = plt.subplots(1, 2, figsize=(7, 2.8), layout="constrained")
+    for step, name, colour in (("shear", "without tension", BLUE), ("shear_tension", "under tension", ORANGE)):
+        run = runs.artifact(place, step)
+        shear.plot(np.degrees(run.array("curves/run/shear_angle")), run.array("curves/run/normalised_force"), color=colour, linewidth=1.2,
+                   label=name)
+    shear.set(xlabel="shear angle (deg)", ylabel="shear force (N/m)")
+    shear.legend(loc="upper left")
+    run = runs.artifact(place, "bending_rf4")
+    k = run.array("curves/run/curvature")
+    bending.plot(k * 1e-3, run.array("curves/run/moment"), color=BLUE, linewidth=1.2, label="computed (rf4)")
+    bending.plot(k * 1e-3, 0.0004 * k, color=GREY, linestyle=(0, (4, 2)), label="the law alone")
+    bending.set(xlabel="curvature (1/mm)", ylabel="moment per width (N)")
+    bending.legend(loc="upper left")
+    return style.save_svg(figure, "hysteresis")
+
+
 def hemisphere():
     """The woven ply of case A in 5 mm shells, pressed: shear from above and the wrinkles from the side."""
     place = runs.run("hemisphere/workflow-coarse")

@@ -21,6 +21,7 @@ mod forming;
 mod geometry;
 mod measurement;
 mod mesh_study;
+mod shear_limits;
 mod shown;
 mod study_table;
 mod zones;
@@ -58,6 +59,7 @@ pub use measurement::{
     SlipSection,
 };
 pub use mesh_study::{MeshStudy, ZoneAdvice};
+pub use shear_limits::ShearLimits;
 pub use shown::{Axis, CarriedFile, Cell, Column, Map, Panel, Paths, Plot, Series, Style, Table};
 pub use study_table::{
     StudyBest, StudyFailure, StudyKeys, StudyOptimisation, StudyOrigin, StudyResponse,

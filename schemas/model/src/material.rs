@@ -1,6 +1,6 @@
 //! A material file: a law (a material plugin with its parameters) and the sheet's thickness and mass.
 
-use crate::units::{ArealMass, Length};
+use crate::units::{Angle, ArealMass, Length};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -27,9 +27,27 @@ pub struct Material {
     /// Mass per area.
     #[schemars(extend("x-exclusive-minimum" = "0 g/m2"))]
     pub areal_mass: ArealMass,
+    /// Plies: the shear angles from which the fabric wrinkles, as a bias-extension test shows. Without them no step judges its shear.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub over_shear: Option<OverShear>,
     /// The plugin's parameters, checked against its manifest.
     #[serde(default)]
     pub with: serde_json::Map<String, serde_json::Value>,
+}
+
+/// Shear angles from which a fabric wrinkles. A sign without one is not judged.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(extend("minProperties" = 1))]
+pub struct OverShear {
+    /// Of positive shear, which stretches the stitch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-minimum" = "0 deg", "x-maximum" = "90 deg"))]
+    pub positive: Option<Angle>,
+    /// Of negative shear, as a negative angle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-minimum" = "-90 deg", "x-maximum" = "0 deg"))]
+    pub negative: Option<Angle>,
 }
 
 /// A material where a scene names one.

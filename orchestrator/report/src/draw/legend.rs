@@ -5,7 +5,7 @@ use crate::draw::colour_bar::bar;
 use crate::plain::{Other, Ply, at_points, range_of};
 use crate::units::{number, quantity, shown};
 use maud::{Markup, html};
-use plyflow_model::artifact::Thresholds;
+use plyflow_model::artifact::Defects;
 
 /// A sheet that moved less than this (m) lies flat.
 const LEAST_DEFLECTION: f64 = 1e-5;
@@ -74,28 +74,38 @@ impl Field {
     }
 
     /// Limits of the detection (SI), drawn on the scale.
-    fn limits(self, thresholds: Option<&Thresholds>) -> Vec<f64> {
-        let Some(t) = thresholds else {
+    fn limits(self, detection: Option<&Defects>) -> Vec<f64> {
+        let Some(d) = detection else {
             return Vec::new();
         };
-        let told = match self {
-            Self::Shear => [t.over_shear_negative, t.over_shear_positive],
-            Self::Distance => [t.distance_threshold, None],
-            Self::Curvature | Self::Deflection => [None; 2],
-        };
-        told.into_iter().flatten().collect()
+        let t = &d.thresholds;
+        match self {
+            Self::Shear => {
+                // Plies of different fabrics have different limits.
+                let of_plies = d.plies.iter().filter_map(|p| p.over_shear);
+                let mut all: Vec<f64> = of_plies
+                    .flat_map(|s| [s.negative, s.positive])
+                    .chain([t.over_shear_negative, t.over_shear_positive])
+                    .flatten()
+                    .collect();
+                all.sort_by(f64::total_cmp);
+                all.dedup();
+                all
+            }
+            Self::Distance => t.distance_threshold.into_iter().collect(),
+            Self::Curvature | Self::Deflection => Vec::new(),
+        }
     }
 
     /// The scale of all maps of this quantity on these plies, global and local, so that colours compare; `None` when no ply has it.
-    /// `thresholds`: of the detection.
-    pub(crate) fn legend(self, plies: &[&Ply], thresholds: Option<&Thresholds>) -> Option<Legend> {
+    pub(crate) fn legend(self, plies: &[&Ply], detection: Option<&Defects>) -> Option<Legend> {
         let values = || {
             (plies.iter())
                 .filter_map(|p| self.stored(p))
                 .flatten()
                 .copied()
         };
-        let limits = self.limits(thresholds);
+        let limits = self.limits(detection);
         let [title, unit, _] = self.about();
         let (factor, _) = shown(unit);
         let end = |part, least| end_of_scale(values(), part, least, factor);

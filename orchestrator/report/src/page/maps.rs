@@ -18,8 +18,8 @@ const LOCAL: f64 = 340.0;
 
 /// The scales of all maps of a study.
 pub(super) fn legends(study: &Study) -> Vec<Legend> {
-    let (plies, thresholds) = (study.all_plies(), study.thresholds());
-    let of = |f: &Field| f.legend(&plies, thresholds);
+    let (plies, detection) = (study.all_plies(), study.detection.as_ref());
+    let of = |f: &Field| f.legend(&plies, detection);
     Field::ALL.iter().filter_map(of).collect()
 }
 

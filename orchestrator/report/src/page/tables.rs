@@ -44,7 +44,9 @@ pub(super) fn zones(study: &Study) -> Markup {
                             th class="n" { "off the tool (mm²)" } th class="n" { "shear (deg)" } th class="n" { "largest distance (mm)" } } }
                         tbody { @for p in &d.plies { tr {
                             th { (p.name) }
-                            @for area in [p.flagged_area, p.over_shear_area, p.poor_conformity_area] { td class="n" { (number(area * 1e6, 4)) } }
+                            @for area in [Some(p.flagged_area), p.over_shear_area, Some(p.poor_conformity_area)] {
+                                td class="n" { (area.map_or_else(|| "not judged".to_owned(), |a| number(a * 1e6, 4))) }
+                            }
                             td class="n" { (fixed(p.shear_min.to_degrees(), 1)) " … " (fixed(p.shear_max.to_degrees(), 1)) }
                             td class="n" { (fixed(p.distance_max * 1e3, 2)) }
                         } } }

@@ -3,7 +3,7 @@
 use crate::plain::{Place, Ply, Tool};
 use crate::read::comparison::Comparison;
 use crate::read::history::History;
-use plyflow_model::artifact::{Confirmation, Defects, Forming, Thresholds, Zone};
+use plyflow_model::artifact::{Confirmation, Defects, Forming, Zone};
 
 /// What one global run led to.
 #[derive(Debug, Default)]
@@ -81,10 +81,5 @@ impl Study {
     pub(crate) fn confirmed_text(&self, id: &str) -> Option<&str> {
         let defects = &self.confirmed.as_ref()?.defects;
         defects.iter().find(|d| d.id == id).map(|d| d.text.as_str())
-    }
-
-    /// From where on the detection flags something.
-    pub(crate) fn thresholds(&self) -> Option<&Thresholds> {
-        self.detection.as_ref().map(|d| &d.thresholds)
     }
 }

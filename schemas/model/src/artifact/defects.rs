@@ -1,6 +1,7 @@
 //! The kind `defects`: what a detection flags on the plies of a formed run.
 
 use crate::artifact::attributes::Attributes;
+use crate::artifact::shear_limits::ShearLimits;
 use crate::artifact::shown;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,10 +26,10 @@ impl Attributes for Defects {
 /// From where on something is flagged. A detection with other criteria tells its own.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Thresholds {
-    /// Cells above this shear angle are flagged (rad).
+    /// Cells above this shear angle are flagged (rad). Left out where plies differ in it, or none is judged by one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub over_shear_positive: Option<f64>,
-    /// Cells below this shear angle are flagged (rad).
+    /// Cells below this shear angle are flagged (rad). Left out as `over_shear_positive` is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub over_shear_negative: Option<f64>,
     /// Nodes above this distance do not conform (m).
@@ -52,8 +53,12 @@ pub struct PlyDefects {
     pub name: String,
     /// Undeformed flagged area (m2).
     pub flagged_area: f64,
-    /// Undeformed area that is sheared too far (m2).
-    pub over_shear_area: f64,
+    /// Shear angles from which its cells are flagged (rad). Left out: its shear was not judged.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub over_shear: Option<ShearLimits>,
+    /// Undeformed area that is sheared too far (m2). Left out where shear was not judged.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub over_shear_area: Option<f64>,
     /// Undeformed area that does not conform to the tool (m2).
     pub poor_conformity_area: f64,
     /// Smallest shear angle (rad).

@@ -1,6 +1,7 @@
 //! The kind `forming`: a formed stack of sheets.
 
 use crate::artifact::attributes::Attributes;
+use crate::artifact::shear_limits::ShearLimits;
 use crate::artifact::zones::Zone;
 use crate::outline::{Millimetres, Point};
 use crate::regions::Stitches;
@@ -115,6 +116,9 @@ pub struct Sheet {
     /// Mass of its material per undeformed area (kg/m2).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub areal_mass: Option<f64>,
+    /// Of a ply whose material says so: the shear angles from which its fabric wrinkles (rad). Left out: its shear is not judged.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub over_shear: Option<ShearLimits>,
     /// Mass that was added to it for a larger step in time (kg).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub added_mass: Option<f64>,
@@ -166,6 +170,7 @@ impl Sheet {
             thickness,
             offset,
             areal_mass: None,
+            over_shear: None,
             added_mass: None,
             element: None,
             element_elsewhere: None,

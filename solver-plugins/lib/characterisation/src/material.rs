@@ -244,13 +244,14 @@ pub fn significant(value: f64) -> String {
 }
 
 /// The order in which people expect a material file's keys; all others follow in the alphabet's.
-const ORDER: [&str; 7] = [
+const ORDER: [&str; 8] = [
     "plyflow_material",
     "name",
     "source",
     "plugin",
     "thickness",
     "areal_mass",
+    "over_shear",
     "with",
 ];
 const WIDTH: usize = 100;

@@ -36,6 +36,9 @@ pub struct Parameters {
     path: Vec<f64>,
     /// Time from one angle to the next (s).
     leg_time: f64,
+    /// Strain of the sides, reached in the first leg.
+    #[serde(default)]
+    fibre_strain: f64,
     /// CSV with columns shear_angle, normalised_force.
     #[serde(default)]
     reference: Option<String>,
@@ -56,9 +59,16 @@ fn square() -> f64 {
 struct Path {
     angles: Vec<f64>,
     leg: f64,
+    /// Of the sides, from the end of the first leg on.
+    strain: f64,
 }
 
 impl Path {
+    /// Length of the sides over that at the start.
+    fn stretch(&self, t: f64) -> f64 {
+        1.0 + self.strain * smooth_step(t, 0.0, self.leg)
+    }
+
     fn angle(&self, t: f64) -> f64 {
         let mut g = 0.0;
         for (k, w) in self.angles.windows(2).enumerate() {
@@ -91,7 +101,8 @@ impl Drive for Frame {
     fn position(&self, k: usize, t: f64) -> Vec3 {
         let half = 0.5 * self.path.angle(t);
         let (c, s) = (half.fixed_cos(), half.fixed_sin());
-        let [x, y] = self.corners[k];
+        let stretch = self.path.stretch(t);
+        let [x, y] = self.corners[k].map(|x| stretch * x);
         [x * c + y * s, x * s + y * c, 0.0]
     }
 }
@@ -143,8 +154,10 @@ impl Test for PictureFrame {
         );
         let angle = self.path.angle(t);
         let (c, s) = ((0.5 * angle).fixed_cos(), (0.5 * angle).fixed_sin());
+        let stretch = self.path.stretch(t);
         let mut moment = 0.0;
-        for (r, [x, y]) in specimen.model.reactions().iter().zip(&self.corners) {
+        for (r, corner) in specimen.model.reactions().iter().zip(&self.corners) {
+            let [x, y] = corner.map(|x| stretch * x);
             moment += 0.5 * (r[0] * (y * c - x * s) + r[1] * (x * c - y * s));
         }
         self.work += moment * 0.5 * (self.path.angle(t + dt) - self.path.angle(t - dt));
@@ -216,6 +229,7 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
     let path = Path {
         angles: std::iter::once(0.0).chain(p.path.iter().copied()).collect(),
         leg: p.leg_time,
+        strain: p.fibre_strain,
     };
     let frame = Frame {
         path: path.clone(),

@@ -53,6 +53,9 @@ pub struct Parameters {
     /// CSV with columns curvature, moment (per width).
     #[serde(default)]
     reference: Option<String>,
+    /// Energy per undeformed area that the whole path should cost (J/m2).
+    #[serde(default)]
+    dissipation: Option<f64>,
 }
 
 struct PureBending {
@@ -65,6 +68,8 @@ struct PureBending {
     rotates: bool,
     /// Sums over the steps since the last sample: generalised force, end moment, curvature, number.
     sum: [f64; 4],
+    /// Work per undeformed area so far (J/m2).
+    work: f64,
     curvature: Vec<f64>,
     moment: Vec<f64>,
     end_moment: Vec<f64>,
@@ -128,6 +133,8 @@ impl Test for PureBending {
         let t = specimen.model.time() - specimen.model.dt();
         let (shear, curvature) = self.history.at(t);
         let [work, end] = self.moments(specimen, shear, curvature);
+        let dt = specimen.model.dt();
+        self.work += work * 0.5 * (self.history.at(t + dt).1 - self.history.at(t - dt).1);
         for (s, v) in self.sum.iter_mut().zip([work, end, curvature, 1.0]) {
             *s += v;
         }
@@ -226,6 +233,7 @@ fn test(host: &Host, p: &Parameters) -> Result<(), StepError> {
         family: p.family,
         rotates,
         sum: [0.0; 4],
+        work: 0.0,
         curvature: Vec::new(),
         moment: Vec::new(),
         end_moment: Vec::new(),
@@ -372,6 +380,10 @@ fn write(
     let path = most(&p.path);
     host.result("curvature_error", test.curvature_error / path, "1")?;
     host.result("fibre_strain_largest", test.fibre_strain, "1")?;
+    if let Some(expected) = p.dissipation {
+        host.result("work_density", test.work, "N/m")?;
+        host.result("dissipation_error", (test.work / expected - 1.0).abs(), "1")?;
+    }
     distortion::tell(host, &done.specimen.mesh, p.common.distortion)?;
     out.about.family = Some(p.family);
     out.about.shear_angle = Some(p.shear_angle);

@@ -8,16 +8,17 @@ use crate::distortion;
 use crate::drives::Held;
 use crate::output::Output;
 use crate::specimen::{Common, Specimen};
+use crate::statics::{LoadStep, rest};
 use plyflow_characterisation::csv::{self, Column};
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Fixed, Model, NodalLoad};
-use plyflow_mechanics::relax::{Tolerance, relax};
+use plyflow_mechanics::relax::Tolerance;
 use plyflow_mechanics::sheet::Pressed;
 use plyflow_model::artifact::{ElementCount, SpecimenBody, Style};
 use plyflow_model::units::Dimension;
-use plyflow_sdk::{Host, On, Progress, Step, StepError};
+use plyflow_sdk::{Host, On, Step, StepError};
 use serde::Deserialize;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::time::Instant;
@@ -359,27 +360,11 @@ fn load(
     for step in 1..=p.steps {
         let ratio = step as f64 / p.steps as f64;
         specimen.model.set_load_factor(p.load * ratio);
-        let relaxed = relax(&mut specimen.model, tolerance, |_| {
-            host.check_cancelled()?;
-            if shown.elapsed().as_secs_f64() > 0.2 {
-                shown = Instant::now();
-                host.progress(&Progress {
-                    fraction: (step as f64 - 0.5) / p.steps as f64,
-                    phase: "loading",
-                    ..Progress::default()
-                });
-            }
-            Ok::<(), Stop>(())
-        })
-        .map_err(|e| e.0)?;
-        if !relaxed.balanced {
-            return Err(format!(
-                "load step {step} of {} is not at rest after {} steps: forces out of balance are {:.1e} of the \
-                 loads, expected {:.1e}. Allow more cycles, use more load steps, or a coarser mesh",
-                p.steps, relaxed.cycles, relaxed.residual, p.balance
-            )
-            .into());
-        }
+        let this = LoadStep {
+            number: step,
+            of: p.steps,
+        };
+        let relaxed = rest(host, &mut specimen.model, tolerance, this, &mut shown)?;
         let displacement = setup.displacements(&specimen.model);
         states.push(State {
             ratio,
@@ -390,21 +375,6 @@ fn load(
         frame(host, specimen, ratio)?;
     }
     Ok(states)
-}
-
-/// Why a relaxation stopped.
-struct Stop(StepError);
-
-impl From<plyflow_mechanics::MechanicsError> for Stop {
-    fn from(e: plyflow_mechanics::MechanicsError) -> Self {
-        Self(e.to_string().into())
-    }
-}
-
-impl From<StepError> for Stop {
-    fn from(e: StepError) -> Self {
-        Self(e)
-    }
 }
 
 /// A frame; its time is the load ratio.

@@ -5,23 +5,62 @@ use crate::ply::Ply;
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::rectangle;
 use plyflow_geometry::vec3::distance;
-use plyflow_model::artifact::{Cause, DefectKind as Kind};
+use plyflow_model::artifact::{Cause, DefectKind as Kind, ShearLimits, Sheet};
 use serde::Deserialize;
 use std::f64::consts::FRAC_PI_2;
 
 /// When a cause is taken for likely.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct Limits {
-    /// Mean shear along the crest above this is over-shear (rad).
-    pub over_shear_positive: f64,
-    /// Mean shear along the crest below this is over-shear (rad).
-    pub over_shear_negative: f64,
+    /// Mean shear along the crest above this is over-shear (rad), whatever the ply's material says.
+    pub over_shear_positive: Option<f64>,
+    /// Mean shear along the crest below this is over-shear (rad), whatever the ply's material says.
+    pub over_shear_negative: Option<f64>,
     /// How near bridging must be, in the flat ply (m).
     pub bridging_reach: f64,
     /// Fibre directions of two plies that differ by less are the same (rad).
     pub layup_angle: f64,
     /// Strain from which on fibres are compressed, as a positive number.
     pub fibre_compression: f64,
+}
+
+impl Limits {
+    /// Of a ply whose material has limits of its own: these count for the signs that are not asked for.
+    #[must_use]
+    pub fn of_ply(&self, material: Option<ShearLimits>) -> Self {
+        let limits = self.shear().or(material.unwrap_or_default());
+        Self {
+            over_shear_positive: limits.positive,
+            over_shear_negative: limits.negative,
+            ..*self
+        }
+    }
+
+    /// What to say where wrinkles of some of these plies cannot be told to come from over-shear; `None`: nothing.
+    pub fn untold<'a>(&self, plies: impl Iterator<Item = &'a Sheet>) -> Option<String> {
+        let without = |sheet: &&Sheet| {
+            let limits = self.of_ply(sheet.over_shear);
+            limits.over_shear_positive.is_none() || limits.over_shear_negative.is_none()
+        };
+        let names: Vec<String> = plies
+            .filter(without)
+            .map(|s| format!("'{}'", s.name))
+            .collect();
+        (!names.is_empty()).then(|| {
+            format!(
+                "over-shear is no cause for wrinkles of {} where neither the material's file (`over_shear`) nor this step says from which \
+                 shear angles the fabric wrinkles",
+                names.join(", ")
+            )
+        })
+    }
+
+    fn shear(&self) -> ShearLimits {
+        ShearLimits {
+            positive: self.over_shear_positive,
+            negative: self.over_shear_negative,
+        }
+    }
 }
 
 /// A ply next to another one in the stack.
@@ -61,7 +100,7 @@ pub fn find_causes(
     };
     let wrinkles = defects.iter_mut().filter(|d| d.kind == Kind::Wrinkle);
     for wrinkle in wrinkles {
-        let over = |g: f64| g > limits.over_shear_positive || g < limits.over_shear_negative;
+        let over = |g: f64| limits.shear().exceeded(g);
         let strain = mean_along(ply, &ply.fibre_strain, &wrinkle.ridge_nodes);
         let compressed = strain.is_some_and(|e| e < -limits.fibre_compression);
         wrinkle.cause = Some(

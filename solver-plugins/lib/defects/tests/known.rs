@@ -493,8 +493,8 @@ fn causes_follow_from_the_fields() {
     let (points, cells) = flat(0.00125, 0.0);
     let mut ply = ply(Topology::new(points.len(), 4, &cells), formed(&points, 0.5));
     let limits = |reach: f64| Limits {
-        over_shear_positive: 8f64.to_radians(),
-        over_shear_negative: -50f64.to_radians(),
+        over_shear_positive: Some(8f64.to_radians()),
+        over_shear_negative: Some(-50f64.to_radians()),
         bridging_reach: reach,
         layup_angle: 5f64.to_radians(),
         fibre_compression: 1e-4,

@@ -3,7 +3,7 @@
 //! With the stretches l1 = sqrt(C11), l2 = sqrt(C22) and s = sin g = C12 / (l1 l2) the form
 //! `fibre-energy` is
 //!
-//! `W = k/2 [(l1 - 1)^2 + (l2 - 1)^2] + Phi(s)`, `dPhi/ds = F_norm(g)`, `k = fibre_modulus * thickness`:
+//! `W = k1/2 (l1 - 1)^2 + k2/2 (l2 - 1)^2 + Phi(s)`, `dPhi/ds = F_norm(g)`, `k = fibre_modulus * thickness` of each family:
 //!
 //! a picture frame does the work `F_norm cos g dg = F_norm ds` per undeformed area, so this energy
 //! gives back the measured curve exactly. `hypoelastic` is the thesis' incremental form (eqs
@@ -15,6 +15,7 @@ mod checks;
 mod cubic;
 mod fibre_energy;
 mod hypoelastic;
+mod hysteresis;
 mod parameters;
 mod ply;
 mod shear;
@@ -39,14 +40,17 @@ impl Material for Fabric {
     }
 
     fn sizes(&self) -> MaterialSizes {
-        let membrane_history = match self.form {
-            Form::FibreEnergy if self.shear.stitch.is_some() => fibre_energy::HISTORY,
+        let slides = self.shear.slider.is_some();
+        let of_form = match self.form {
+            Form::FibreEnergy if slides || self.shear.stitch.is_some() => fibre_energy::HISTORY,
             Form::FibreEnergy => 0,
             Form::Hypoelastic => hypoelastic::HISTORY,
         };
+        let of_slider = if slides { hysteresis::HISTORY } else { 0 };
+        let bends = self.bending.as_ref();
         MaterialSizes {
-            membrane_history,
-            bending_history: 0,
+            membrane_history: of_form + of_slider,
+            bending_history: bends.map_or(0, bending::Bending::history),
             has_bending: self.bending.is_some(),
             thickness: self.thickness,
             areal_mass: self.areal_mass,
@@ -62,6 +66,15 @@ impl Material for Fabric {
         if let Some(law) = &self.bending {
             let tangent = b.tangent.as_deref_mut().unwrap_or(&mut []);
             bending::moments(law, b.lanes, b.curvature, b.moment, b.energy, tangent);
+            if let Some(sliders) = &law.sliders {
+                let of = bending::Rubbed {
+                    history: &mut *b.history,
+                    moment: &mut *b.moment,
+                    energy: &mut *b.energy,
+                    tangent,
+                };
+                bending::rub(sliders, b.lanes, b.curvature, of);
+            }
         }
     }
 }
@@ -89,19 +102,19 @@ fn membrane_kernel<V: Lanes>(
     let stitch = f.shear.stitch.as_ref();
     // Compiled for each kind of yarns and each form.
     macro_rules! of_yarn {
-        ($yarn:expr) => {{
+        ($yarn:expr, $slides:literal) => {{
             let law = ShearOf {
                 yarn: $yarn,
                 stitch,
             };
             match f.form {
                 Form::FibreEnergy => {
-                    fibre_energy::membrane::<V, _>(
+                    fibre_energy::membrane::<V, _, $slides>(
                         f, law, n, metric, history, stress, energy, stiffness,
                     );
                 }
                 Form::Hypoelastic => {
-                    hypoelastic::membrane::<V, _>(
+                    hypoelastic::membrane::<V, _, $slides>(
                         f, law, n, metric, history, stress, energy, stiffness,
                     );
                 }
@@ -109,8 +122,9 @@ fn membrane_kernel<V: Lanes>(
         }};
     }
     match &f.shear.yarn {
-        Yarn::Polynomial(yarn) => of_yarn!(&**yarn),
-        Yarn::Table(yarn) => of_yarn!(yarn),
-        Yarn::Signed(yarn) => of_yarn!(&**yarn),
+        Yarn::Polynomial(yarn) => of_yarn!(&**yarn, false),
+        Yarn::Table(yarn) => of_yarn!(yarn, false),
+        Yarn::Signed(yarn) if f.shear.slider.is_some() => of_yarn!(&**yarn, true),
+        Yarn::Signed(yarn) => of_yarn!(&**yarn, false),
     }
 }

@@ -9,6 +9,7 @@
 //! which keeps the bending force the exact gradient of this energy.
 
 use super::cubic::Cubic;
+use super::hysteresis::{HISTORY, Slider};
 use crate::{Lanes, WIDTH, dispatch, exp};
 
 /// Voce's law (SI: N m, N, 1/m).
@@ -50,6 +51,72 @@ pub(super) struct Bending {
     pub signs: [f64; 2],
     /// dM12/dk12 (N m).
     pub twist: f64,
+    /// Friction of the yarns of each family; `None`: neither has any.
+    pub sliders: Option<[Option<Slider>; 2]>,
+}
+
+impl Bending {
+    /// Rows of history.
+    pub(super) fn history(&self) -> usize {
+        self.sliders.map_or(0, |_| 2 * HISTORY)
+    }
+}
+
+/// What friction is added to.
+pub(super) struct Rubbed<'a> {
+    /// `[2][HISTORY][n]`.
+    pub history: &'a mut [f64],
+    pub moment: &'a mut [f64],
+    pub energy: &'a mut [f64],
+    /// May be empty.
+    pub tangent: &'a mut [f64],
+}
+
+dispatch!(pub(super) fn rub(
+    sliders: &[Option<Slider>; 2],
+    n: usize,
+    curvature: &[f64],
+    of: Rubbed<'_>,
+) = rub_kernel);
+
+/// Adds the moments of the families' friction to those of their laws.
+#[inline(always)]
+fn rub_kernel<V: Lanes>(
+    sliders: &[Option<Slider>; 2],
+    n: usize,
+    curvature: &[f64],
+    of: Rubbed<'_>,
+) {
+    let zero = V::splat(0.0);
+    for (family, slider) in sliders.iter().enumerate() {
+        let Some(slider) = slider else {
+            continue;
+        };
+        for c in (0..n).step_by(WIDTH) {
+            let at = family * n + c;
+            let row = |r: usize| (family * HISTORY + r) * n + c;
+            let stands = V::load(of.history, row(0));
+            let slid = slider.at(
+                V::load(curvature, at),
+                zero,
+                stands,
+                V::load(of.history, row(1)),
+            );
+            slid.stands.store(of.history, row(0));
+            slid.lost.store(of.history, row(1));
+            (V::load(of.moment, at) + slid.force).store(of.moment, at);
+            (V::load(of.energy, c) + slid.energy).store(of.energy, c);
+            if !of.tangent.is_empty() {
+                // Where it slides the moment does not grow any more.
+                let held = V::select(
+                    slid.force.abs().lt(V::splat(slider.limit)),
+                    V::splat(slider.stiffness),
+                    zero,
+                );
+                (V::load(of.tangent, at) + held).store(of.tangent, at);
+            }
+        }
+    }
 }
 
 dispatch!(pub(super) fn moments(

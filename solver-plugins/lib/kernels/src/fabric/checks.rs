@@ -9,6 +9,8 @@ const LARGEST_ANGLE: f64 = 1.5;
 /// Least last angle of a shear table (5 deg, as the least limit of a polynomial): a shorter one is a
 /// wrong unit, and all of a forming run would lie beyond it.
 const LEAST_LAST_ANGLE: f64 = 5.0 * std::f64::consts::PI / 180.0;
+/// Largest angle over which friction of the yarns builds up (30 deg): it is that of the corner of a loop.
+const LARGEST_SLIP: f64 = 30.0 * std::f64::consts::PI / 180.0;
 /// Places at which the slope of a polynomial is looked at.
 const SAMPLES: usize = 2000;
 
@@ -34,6 +36,18 @@ pub(super) fn not_negative(name: &str, value: f64, unit: &str) -> Result<(), Str
     }
     Err(format!(
         "{name}: given {value} {unit}; expected a finite value of at least 0"
+    ))
+}
+
+/// The angle over which friction of the yarns builds up.
+pub(super) fn slips(name: &str, angle_given: f64) -> Result<(), String> {
+    if angle_given > 0.0 && angle_given <= LARGEST_SLIP {
+        return Ok(());
+    }
+    Err(format!(
+        "{name}: given {}; expected more than 0 deg and at most {:.0} deg: the angle over which the force turns round where the shear does",
+        angle(angle_given),
+        LARGEST_SLIP.to_degrees()
     ))
 }
 

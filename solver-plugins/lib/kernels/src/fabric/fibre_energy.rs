@@ -5,12 +5,14 @@ use super::shear::ShearOf;
 use super::yarn::Law;
 use crate::{Lanes, WIDTH};
 
-/// Rows of history with a stitch: largest shear angle, its sine.
+/// Rows of history with a stitch: largest shear angle, its sine. Those of a slider follow, and then the stitch's are there in any case.
 pub(super) const HISTORY: usize = 2;
 
-/// Stresses and energies from the metric; the history is that of the stitch, `stiffness` may be empty.
+/// Stresses and energies from the metric; the history is that of the stitch, `stiffness` may be empty. `SLIDES`: whether yarns rub, which
+/// is known when it is compiled, as the test for it would cost the others a tenth of their time.
+/// Long, as it is the loop of a kernel: pieces of it would share most of its values, and its speed would hang on how they are inlined.
 #[inline(always)]
-pub(super) fn membrane<V: Lanes, L: Law>(
+pub(super) fn membrane<V: Lanes, L: Law, const SLIDES: bool>(
     f: &Fabric,
     law: ShearOf<'_, L>,
     n: usize,
@@ -21,7 +23,8 @@ pub(super) fn membrane<V: Lanes, L: Law>(
     stiffness: &mut [f64],
 ) {
     let (one, half) = (V::splat(1.0), V::splat(0.5));
-    let (tension, compression) = (V::splat(f.tension), V::splat(f.compression));
+    let [tension_1, tension_2] = f.tension.map(V::splat);
+    let [compression_1, compression_2] = f.compression.map(V::splat);
     for c in (0..n).step_by(WIDTH) {
         let c11 = V::load(metric, c).max(V::splat(LEAST));
         let c22 = V::load(metric, n + c).max(V::splat(LEAST));
@@ -31,11 +34,11 @@ pub(super) fn membrane<V: Lanes, L: Law>(
         let (r1, r2) = (i1.sqrt(), i2.sqrt());
         let (d1, d2) = (c11 * r1 - one, c22 * r2 - one);
         let zero = V::splat(0.0);
-        let k1 = V::select(d1.lt(zero), compression, tension);
-        let k2 = V::select(d2.lt(zero), compression, tension);
+        let k1 = V::select(d1.lt(zero), compression_1, tension_1);
+        let k2 = V::select(d2.lt(zero), compression_2, tension_2);
         let rr = r1 * r2;
         let s = c12 * rr;
-        let shear = if law.stitch.is_some() {
+        let mut shear = if law.stitch.is_some() {
             let (g, sine) = (V::load(history, c), V::load(history, n + c));
             let (shear, g, sine) = law.with_stitch(s, g, sine);
             g.store(history, c);
@@ -44,14 +47,27 @@ pub(super) fn membrane<V: Lanes, L: Law>(
         } else {
             law.yarn(s)
         };
+        if SLIDES && let Some(slider) = &f.shear.slider {
+            let tension = (k1 * d1).max(zero) + (k2 * d2).max(zero);
+            let row = |r: usize| (HISTORY + r) * n + c;
+            let (stands, lost) = (V::load(history, row(0)), V::load(history, row(1)));
+            let slid = slider.at(s, tension, stands, lost);
+            slid.stands.store(history, row(0));
+            slid.lost.store(history, row(1));
+            shear.force = shear.force + slid.force;
+            shear.energy = shear.energy + slid.energy;
+        }
         let fs = shear.force * s;
         (k1 * d1 * r1 - fs * i1).store(stress, c);
         (k2 * d2 * r2 - fs * i2).store(stress, n + c);
         (shear.force * rr).store(stress, 2 * n + c);
         (half * (k1 * d1 * d1 + k2 * d2 * d2) + shear.energy).store(energy, c);
         if !stiffness.is_empty() {
-            let slope = law.slopes(s).0;
-            let (a1, a2) = (tension * i1 * r1, tension * i2 * r2);
+            let mut slope = law.slopes(s).0;
+            if SLIDES && let Some(slider) = &f.shear.slider {
+                slope = slope + V::splat(slider.stiffness);
+            }
+            let (a1, a2) = (tension_1 * i1 * r1, tension_2 * i2 * r2);
             let (largest, soft) = tangents(slope, s, i1, i2, a1, a2, shear.force.abs());
             largest.store(stiffness, c);
             soft.store(stiffness, n + c);

@@ -18,14 +18,14 @@ use super::yarn::Law;
 use crate::{Lanes, WIDTH};
 
 /// Rows: C11 - 1, C22 - 1, C12 before; N1, N2, T1, T2 (N/m); F_norm cos g / 2 (N/m) before; work
-/// (J/m2); largest shear angle of the stitch and its sine.
+/// (J/m2); largest shear angle of the stitch and its sine. Those of a slider follow.
 pub(super) const HISTORY: usize = 11;
 const SINE_LIMIT: f64 = 0.985;
 
 /// Stresses and energies from the metric and the [`HISTORY`]; `stiffness` may be empty.
 /// Long, as it is the loop of a kernel: pieces of it would share most of its values, and its speed would hang on how they are inlined.
 #[inline(always)]
-pub(super) fn membrane<V: Lanes, L: Law>(
+pub(super) fn membrane<V: Lanes, L: Law, const SLIDES: bool>(
     f: &Fabric,
     law: ShearOf<'_, L>,
     n: usize,
@@ -38,11 +38,12 @@ pub(super) fn membrane<V: Lanes, L: Law>(
     let (half, one, two) = (V::splat(0.5), V::splat(1.0), V::splat(2.0));
     let (least, end) = (V::splat(LEAST), V::splat(SINE_LIMIT));
     let sine = |c12: V, r: V| (c12 * r).max(-end).min(end);
-    let (tension, compression) = (V::splat(f.tension), V::splat(f.compression));
+    let (tension, compression) = (f.tension.map(V::splat), f.compression.map(V::splat));
     let uneven = f.tension != f.compression;
-    // A fibre's stress after a step from the stretch `o` to `l` with the strain increment `e`, and what it does meanwhile (J/m2). A step that
+    // Of a family: a fibre's stress after a step from the stretch `o` to `l` with the strain increment `e`, and what it does meanwhile (J/m2). A step that
     // passes l = 1 has each modulus for its own part: with one of them for all of it fibres that tremble about no strain would make energy.
-    let fibre = |n: V, l: V, o: V, e: V| {
+    let fibre = |family: usize, n: V, l: V, o: V, e: V| {
+        let (tension, compression) = (tension[family], compression[family]);
         let k = V::select(l.lt(one), compression, tension);
         let (m, work) = (n + k * e, half * (n + (n + k * e)) * e);
         if !uneven {
@@ -78,12 +79,22 @@ pub(super) fn membrane<V: Lanes, L: Law>(
         let e2 = two * (l2 - o2) / (l2 + o2);
         let ratio = s / cosine;
         let middle = half * (ratio + before / (one - before * before).sqrt());
-        let (m1, w1) = fibre(row(history, 3), l1, o1, e1);
-        let (m2, w2) = fibre(row(history, 4), l2, o2, e2);
+        let (m1, w1) = fibre(0, row(history, 3), l1, o1, e1);
+        let (m2, w2) = fibre(1, row(history, 4), l2, o2, e2);
         // Shear stress of each frame.
-        let (response, g, gs) = law.with_stitch(s, row(history, 9), row(history, 10));
+        let (mut response, g, gs) = law.with_stitch(s, row(history, 9), row(history, 10));
+        if SLIDES && let Some(slider) = &f.shear.slider {
+            let tension = m1.max(V::splat(0.0)) + m2.max(V::splat(0.0));
+            let slid = slider.at(s, tension, row(history, 11), row(history, 12));
+            slid.stands.store(history, HISTORY * n + c);
+            slid.lost.store(history, (HISTORY + 1) * n + c);
+            response.force = response.force + slid.force;
+        }
         let q = half * response.force * cosine;
-        let (bound, yarn) = law.slopes(s);
+        let (mut bound, yarn) = law.slopes(s);
+        if SLIDES && let Some(slider) = &f.shear.slider {
+            bound = bound + V::splat(slider.stiffness);
+        }
         let modulus = half * (yarn * cosine - response.force * s / cosine) * cosine;
         let lean = modulus * middle * (e2 - e1);
         let dq = q - row(history, 7);
@@ -118,8 +129,8 @@ pub(super) fn membrane<V: Lanes, L: Law>(
         work.store(energy, c);
         if !stiffness.is_empty() {
             // d(N / C) / dE = (k - 2 N) / C^2; the frames' shear as in the energy form.
-            let a1 = (tension + two * m1.abs()) * i1 * i1;
-            let a2 = (tension + two * m2.abs()) * i2 * i2;
+            let a1 = (tension[0] + two * m1.abs()) * i1 * i1;
+            let a2 = (tension[1] + two * m2.abs()) * i2 * i2;
             let (largest, soft) = tangents(bound, s, i1, i2, a1, a2, response.force.abs());
             largest.store(stiffness, c);
             soft.store(stiffness, n + c);

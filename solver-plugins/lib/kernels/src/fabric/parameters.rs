@@ -3,10 +3,12 @@
 use super::bending::{Bending, Law, Laws, Voce};
 use super::checks::{self, not_negative, positive};
 use super::cubic::Cubic;
+use super::hysteresis::Slider;
 use super::ply::{Fabric, Form};
 use super::shear::Shear;
 use super::stitch::Stitch;
 use super::yarn::{Branch, Table};
+use plyflow_fixed::FixedBits;
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -15,8 +17,10 @@ pub(super) struct Parameters {
     #[serde(default = "fibre_energy")]
     form: Form,
     fibre_modulus: f64,
+    fibre_modulus_2: Option<f64>,
     #[serde(default = "one")]
     compression_factor: f64,
+    compression_factor_2: Option<f64>,
     shear: ShearParameters,
     stitch: Option<StitchParameters>,
     bending: Option<BendingParameters>,
@@ -33,6 +37,23 @@ struct ShearParameters {
     negative: Option<NegativeParameters>,
     #[serde(default)]
     allow_softening: bool,
+    hysteresis: Option<ShearHysteresis>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ShearHysteresis {
+    force: f64,
+    angle: f64,
+    #[serde(default)]
+    per_tension: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BendingHysteresis {
+    moment: f64,
+    curvature: f64,
 }
 
 #[derive(Deserialize)]
@@ -72,6 +93,7 @@ enum Direction {
 struct BendingParameters {
     positive: Option<LawParameters>,
     negative: Option<LawParameters>,
+    hysteresis: Option<BendingHysteresis>,
     family_1: Option<FamilyParameters>,
     family_2: Option<FamilyParameters>,
     #[serde(default)]
@@ -86,6 +108,7 @@ struct BendingParameters {
 struct FamilyParameters {
     positive: LawParameters,
     negative: Option<LawParameters>,
+    hysteresis: Option<BendingHysteresis>,
 }
 
 #[derive(Deserialize)]
@@ -131,25 +154,34 @@ fn one() -> f64 {
 
 impl Parameters {
     pub(super) fn build(self) -> Result<Fabric, String> {
-        positive("fibre_modulus", self.fibre_modulus, "Pa")?;
+        let moduli = [
+            self.fibre_modulus,
+            self.fibre_modulus_2.unwrap_or(self.fibre_modulus),
+        ];
+        let factors = [
+            self.compression_factor,
+            self.compression_factor_2.unwrap_or(self.compression_factor),
+        ];
+        positive("fibre_modulus", moduli[0], "Pa")?;
+        positive("fibre_modulus_2", moduli[1], "Pa")?;
         positive("thickness", self.thickness, "m")?;
         positive("areal_mass", self.areal_mass, "kg/m2")?;
-        if !(0.0..=1.0).contains(&self.compression_factor) {
-            return Err(format!(
-                "compression_factor: given {}; expected 0 to 1",
-                self.compression_factor
-            ));
+        let names = ["compression_factor", "compression_factor_2"];
+        for (name, factor) in names.iter().zip(factors) {
+            if !(0.0..=1.0).contains(&factor) {
+                return Err(format!("{name}: given {factor}; expected 0 to 1"));
+            }
         }
         let shear = self.shear.build(self.stitch)?;
         let h = self.thickness;
         let bending = self
             .bending
             .map(|b| b.build(shear.initial_slope() * h * h / 6.0));
-        let tension = self.fibre_modulus * h;
+        let tension = moduli.map(|modulus| modulus * h);
         Ok(Fabric {
             form: self.form,
             tension,
-            compression: tension * self.compression_factor,
+            compression: [0, 1].map(|family| tension[family] * factors[family]),
             shear,
             bending: bending.transpose()?,
             thickness: h,
@@ -183,7 +215,42 @@ impl ShearParameters {
             }
             None => None,
         };
-        Ok(Shear::new(positive, negative, stitch))
+        let slider = self.hysteresis.map(|h| h.build()).transpose()?;
+        Ok(Shear::new(positive, negative, stitch, slider))
+    }
+}
+
+impl ShearHysteresis {
+    fn build(self) -> Result<Slider, String> {
+        let path = "shear.hysteresis";
+        positive(&format!("{path}.force"), self.force, "N/m")?;
+        checks::slips(&format!("{path}.angle"), self.angle)?;
+        not_negative(
+            &format!("{path}.per_tension"),
+            self.per_tension,
+            "N/m per N/m",
+        )?;
+        Ok(Slider {
+            limit: self.force,
+            stiffness: self.force / self.angle.fixed_sin(),
+            per_tension: self.per_tension,
+        })
+    }
+}
+
+impl BendingHysteresis {
+    fn build(self, path: &str) -> Result<Slider, String> {
+        positive(&format!("{path}.hysteresis.moment"), self.moment, "N")?;
+        positive(
+            &format!("{path}.hysteresis.curvature"),
+            self.curvature,
+            "1/m",
+        )?;
+        Ok(Slider {
+            limit: self.moment,
+            stiffness: self.moment / self.curvature,
+            per_tension: 0.0,
+        })
     }
 }
 
@@ -222,15 +289,29 @@ fn branch(
 impl BendingParameters {
     /// `twist`: dM12/dk12 when none is given.
     fn build(self, twist: f64) -> Result<Bending, String> {
+        let slider =
+            |path: &str, h: Option<BendingHysteresis>| h.map(|h| h.build(path)).transpose();
+        let mut sliders = [slider("bending", self.hysteresis)?; 2];
         let laws = match (self.positive, self.negative, self.family_1, self.family_2) {
             (Some(p), n, None, None) => {
                 let both = pair("bending", p, n)?;
                 [both.clone(), both]
             }
-            (None, None, Some(a), Some(b)) => [
-                pair("bending.family_1", a.positive, a.negative)?,
-                pair("bending.family_2", b.positive, b.negative)?,
-            ],
+            (None, None, Some(a), Some(b)) => {
+                if sliders[0].is_some() {
+                    return Err("bending.hysteresis: given together with 'family_1' and 'family_2'; expected \
+                                'hysteresis' inside of each of them"
+                        .into());
+                }
+                sliders = [
+                    slider("bending.family_1", a.hysteresis)?,
+                    slider("bending.family_2", b.hysteresis)?,
+                ];
+                [
+                    pair("bending.family_1", a.positive, a.negative)?,
+                    pair("bending.family_2", b.positive, b.negative)?,
+                ]
+            }
             (p, n, a, b) => {
                 let given: Vec<&str> = [
                     (p.is_some(), "positive"),
@@ -264,6 +345,7 @@ impl BendingParameters {
             laws: Laws::from(laws),
             signs: [first, second],
             twist,
+            sliders: sliders.iter().any(Option::is_some).then_some(sliders),
         })
     }
 }

@@ -17,9 +17,9 @@ pub(super) enum Form {
 /// A fabric ply.
 pub struct Fabric {
     pub(super) form: Form,
-    /// Fibre stiffness in tension and in compression (N/m).
-    pub(super) tension: f64,
-    pub(super) compression: f64,
+    /// Fibre stiffness of each family in tension and in compression (N/m).
+    pub(super) tension: [f64; 2],
+    pub(super) compression: [f64; 2],
     pub(super) shear: Shear,
     pub(super) bending: Option<Bending>,
     pub(super) thickness: f64,

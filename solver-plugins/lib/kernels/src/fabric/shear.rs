@@ -3,6 +3,7 @@
 //! Yarns: a law up to its limit angle; beyond it F goes on along its tangent over s (the secant,
 //! where that is steeper), which is convex and finite at |s| = 1.
 
+use super::hysteresis::Slider;
 use super::stitch::Stitch;
 use super::yarn::{Angle, Branch, Law, Polynomial, Response, Signed, Table};
 use crate::{Lanes, asin};
@@ -20,17 +21,28 @@ pub(super) enum Yarn {
 pub(super) struct Shear {
     pub yarn: Yarn,
     pub stitch: Option<Stitch>,
+    pub slider: Option<Slider>,
     initial_slope: f64,
 }
 
 impl Shear {
-    /// The law for g > 0, that for g < 0 over |g| (absent: odd), and the stitch.
-    pub(super) fn new(positive: Branch, negative: Option<Branch>, stitch: Option<Stitch>) -> Self {
+    /// The law for g > 0, that for g < 0 over |g| (absent: odd), the stitch, and the friction of the yarns.
+    pub(super) fn new(
+        positive: Branch,
+        negative: Option<Branch>,
+        stitch: Option<Stitch>,
+        slider: Option<Slider>,
+    ) -> Self {
         let first = positive.initial_slope();
         let initial_slope = negative
             .as_ref()
             .map_or(first, |n| 0.5 * (first + n.initial_slope()));
         let yarn = match (positive, negative) {
+            // Yarns that rub have one kernel, that of any two laws.
+            (p, n) if slider.is_some() => Yarn::Signed(Box::new(Signed {
+                negative: n.unwrap_or_else(|| p.clone()),
+                positive: p,
+            })),
             (Branch::Polynomial(p), None) => Yarn::Polynomial(p),
             (Branch::Table(t), None) => Yarn::Table(t),
             (positive, Some(negative)) => Yarn::Signed(Box::new(Signed { positive, negative })),
@@ -38,6 +50,7 @@ impl Shear {
         Self {
             yarn,
             stitch,
+            slider,
             initial_slope,
         }
     }

@@ -39,7 +39,12 @@ impl Step for Comparison {
             phase: "measuring",
             ..Default::default()
         });
-        let table = defect_table(&models, &zones, &settings, &host.parameters::<Limits>()?);
+        let limits: Limits = host.parameters()?;
+        let local = models.iter().find(|m| m.role == Role::Local);
+        if let Some(text) = local.and_then(|m| limits.untold(m.sheets.iter())) {
+            host.log(Log::Info, &text);
+        }
+        let table = defect_table(&models, &zones, &settings, &limits);
         for e in table.iter().filter(|e| e.touches_cut()) {
             let zone = &zones[e.zone].name;
             let text = format!(

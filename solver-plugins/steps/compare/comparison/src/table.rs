@@ -98,11 +98,10 @@ fn entries_of(
         // The mesh of a zone reaches past it, to the nearest lines of the whole's.
         let inside: Vec<bool> = ply.undeformed.iter().map(within).collect();
         let mut measured = measure(ply, &inside, settings);
-        let (fibres, others) = (
-            model.sheets[k].fibres(),
-            neighbours(&model.sheets, &model.plies, k),
-        );
-        find_causes(ply, &mut measured, fibres, &others, limits);
+        let sheet = &model.sheets[k];
+        let others = neighbours(&model.sheets, &model.plies, k);
+        let limits = limits.of_ply(sheet.over_shear);
+        find_causes(ply, &mut measured, sheet.fibres(), &others, &limits);
         let cuts = z.cuts(bounds_in_whole(models, &ply.name), bounds_of(ply));
         for defect in measured {
             let near = |side: usize| {

@@ -144,6 +144,16 @@ fn a_wrinkle_has_its_cause_and_the_shear_along_its_crest_as_a_measurement_would_
 
     let cause = |parameters: Value| wrinkle(parameters, &global, &local)[0]["cause"].clone();
     assert_eq!(cause(json!({"over_shear_negative": -0.03})), "over-shear");
+    // What the material of the ply says counts as well, but less than what the step is asked for.
+    let mut of_material = local.clone();
+    of_material.attributes["sheets"][0]["over_shear"] = json!({"positive": 1.0, "negative": -0.03});
+    let cause_of =
+        |parameters: Value| wrinkle(parameters, &global, &of_material)[0]["cause"].clone();
+    assert_eq!(cause_of(json!({})), "over-shear");
+    assert_eq!(
+        cause_of(json!({"over_shear_negative": -0.5})),
+        "undetermined"
+    );
     assert_eq!(cause(json!({"bridging_reach": 0.06})), "bridging");
     // A second ply at an angle, and fibres that are compressed along the crest.
     for run_off in [&mut global, &mut local] {

@@ -44,6 +44,9 @@ impl Step for DefectMeasurement {
         let sections = corners.collect::<Result<Vec<_>, _>>()?;
         phase(host, "reading", 0.0)?;
         let run = read::Run::read(host)?;
+        if let Some(text) = limits.untold(run.plies.iter()) {
+            host.log(Log::Info, &text);
+        }
         let mut measured = of_run(host, &run, &settings, &limits)?;
         let (mut alignment, mut agreement) = (None, None);
         if p.scan.is_some() {
@@ -97,7 +100,8 @@ fn of_run(
     let found = |(k, sheet): (usize, &Sheet)| {
         let mut defects = everywhere(&plies[k], settings);
         let others = neighbours(&run.plies, &plies, k);
-        find_causes(&plies[k], &mut defects, sheet.fibres(), &others, limits);
+        let limits = limits.of_ply(sheet.over_shear);
+        find_causes(&plies[k], &mut defects, sheet.fibres(), &others, &limits);
         defects
     };
     let found: Vec<Vec<Defect>> = run.plies.iter().enumerate().map(found).collect();

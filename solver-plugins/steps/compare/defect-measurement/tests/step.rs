@@ -60,6 +60,18 @@ fn causes_are_told_from_shear_bridging_and_layup() {
     let cause = |parameters: Value| measured(parameters).attributes["defects"][0]["cause"].clone();
     // 0.1 rad are 5.7 degrees. The crest ends 22 mm from where the blister is 1 mm high, or somewhat more.
     assert_eq!(cause(json!({"over_shear_positive": 0.09})), "over-shear");
+    let mut of_material = formed();
+    let sheets = of_material.attributes["sheets"].as_array_mut().unwrap();
+    for sheet in sheets {
+        sheet["over_shear"] = json!({"positive": 0.09});
+    }
+    let inputs = [MemoryInput::new("formed", &of_material)];
+    let out = run::<DefectMeasurement>(json!({}), &inputs, &[]).unwrap();
+    assert_eq!(out.attributes["defects"][0]["cause"], "over-shear");
+    assert!(
+        out.log.iter().any(|l| l.contains("over-shear is no cause")),
+        "negative shear is not judged"
+    );
     assert_eq!(cause(json!({"bridging_reach": 0.06})), "bridging");
     let mut run_off = formed();
     run_off.bodies[2].fields[0][1].values.fill(-2e-4);

@@ -1,17 +1,17 @@
 //! The criteria of thesis 5.2.2 on one ply.
 
 use plyflow_geometry::vec3::Vec3;
-use plyflow_model::artifact::{self, PlyDefects};
+use plyflow_model::artifact::{PlyDefects, ShearLimits};
 use plyflow_surface::{Surface, Topology, curvatures, nodal_distances};
 use serde::Deserialize;
 
 /// When a place counts as a defect.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct Thresholds {
-    /// Cells above this shear angle are flagged (rad).
-    pub over_shear_positive: f64,
-    /// Cells below this shear angle are flagged (rad).
-    pub over_shear_negative: f64,
+    /// Cells above this shear angle are flagged (rad), whatever the ply's material says.
+    pub over_shear_positive: Option<f64>,
+    /// Cells below this shear angle are flagged (rad), whatever the ply's material says.
+    pub over_shear_negative: Option<f64>,
     /// Nodes above this distance do not conform (m).
     pub distance_threshold: f64,
     /// Nodes whose closest point is nearer to the tool's foot are not judged (m).
@@ -19,15 +19,11 @@ pub struct Thresholds {
 }
 
 impl Thresholds {
-    /// For the artifact.
-    pub fn told(&self) -> artifact::Thresholds {
-        artifact::Thresholds {
-            over_shear_positive: Some(self.over_shear_positive),
-            over_shear_negative: Some(self.over_shear_negative),
-            distance_threshold: Some(self.distance_threshold),
-            foot_margin: Some(self.foot_margin),
-            ruck_height: None,
-            other: serde_json::Map::new(),
+    /// Limits of shear that were asked for, which count more than those of a material.
+    pub fn asked(&self) -> ShearLimits {
+        ShearLimits {
+            positive: self.over_shear_positive,
+            negative: self.over_shear_negative,
         }
     }
 }
@@ -45,6 +41,8 @@ pub struct Ply<'a> {
     pub formed: &'a [Vec3],
     /// `[cells]` (rad).
     pub shear_angle: &'a [f64],
+    /// Shear angles from which it counts as over-sheared; `None`: its shear is not judged.
+    pub over_shear: Option<ShearLimits>,
     /// Distance of the mid-plane from the tool when all sheets lie on it (m).
     pub offset: f64,
     /// `[nodes]` what of that is not there, because plies below end beside it (m); `None`: all is there.
@@ -79,7 +77,7 @@ pub fn detect(tool: &Surface, ply: &Ply<'_>, thresholds: &Thresholds) -> Detecti
         .iter()
         .map(|d| d.judged && d.value > t.distance_threshold)
         .collect();
-    let is_over = |&g: &f64| g > t.over_shear_positive || g < t.over_shear_negative;
+    let is_over = |&g: &f64| ply.over_shear.is_some_and(|limits| limits.exceeded(g));
     let over_shear: Vec<bool> = ply.shear_angle.iter().map(is_over).collect();
     let is_poor = |&i: &u32| poor_conformity[i as usize];
     let poor: Vec<bool> = (0..ply.topology.cells())
@@ -105,7 +103,8 @@ pub fn detect(tool: &Surface, ply: &Ply<'_>, thresholds: &Thresholds) -> Detecti
     let summary = PlyDefects {
         name: ply.name.to_owned(),
         flagged_area: area(&flag),
-        over_shear_area: area(&over_shear),
+        over_shear: ply.over_shear,
+        over_shear_area: ply.over_shear.map(|_| area(&over_shear)),
         poor_conformity_area: area(&poor),
         shear_min: shear(f64::min),
         shear_max: shear(f64::max),

@@ -9,6 +9,7 @@ mod compressed;
 mod detect;
 mod laws;
 mod ruck;
+mod shear;
 
 pub use along::Stretch;
 pub use compressed::{Carrying, Law, excess};
@@ -49,16 +50,23 @@ struct Parameters {
 
 impl Parameters {
     /// For the artifact.
-    fn told(&self) -> artifact::Thresholds {
+    fn told(&self, plies: &[Judged]) -> artifact::Thresholds {
+        let limits = shear::common(plies.iter().map(|p| p.found.summary.over_shear));
         artifact::Thresholds {
+            over_shear_positive: limits.positive,
+            over_shear_negative: limits.negative,
+            distance_threshold: Some(self.thresholds.distance_threshold),
+            foot_margin: Some(self.thresholds.foot_margin),
             ruck_height: self.scene.as_ref().map(|_| self.ruck_height),
-            ..self.thresholds.told()
+            other: serde_json::Map::new(),
         }
     }
 }
 
 struct Judged {
     name: String,
+    /// Name of its material.
+    material: Option<String>,
     /// Undeformed area of what is judged (m2).
     area: f64,
     points: Vec<Vec3>,
@@ -113,10 +121,14 @@ impl Step for DefectDetection {
                 ply.add(buckling);
             }
         }
-        for text in judged
-            .iter()
-            .filter_map(|ply| over_sheared(ply, &p.thresholds))
-        {
+        for text in judged.iter().filter_map(over_sheared) {
+            host.log(Log::Warn, &text);
+        }
+        let limits = judged.iter().map(|ply| {
+            let material = ply.material.as_deref();
+            (ply.name.as_str(), material, ply.found.summary.over_shear)
+        });
+        for text in shear::not_judged(limits) {
             host.log(Log::Warn, &text);
         }
         write(host, meshes.times[frame], &judged, &p)
@@ -147,6 +159,7 @@ fn judge(
         undeformed: &part.flat,
         formed: &part.points,
         shear_angle: &shear_angle,
+        over_shear: shear::limits(sheet, thresholds.asked()),
         offset: sheet.offset,
     };
     let found = detect(tool, &ply, thresholds);
@@ -154,6 +167,7 @@ fn judge(
     let mut judged = Judged {
         area,
         name: sheet.name.clone(),
+        material: sheet.material.clone(),
         points,
         cells,
         undeformed,
@@ -213,20 +227,20 @@ impl Judged {
 const MUCH: f64 = 0.4;
 
 /// What to say of a ply of which most counts as over-sheared.
-fn over_sheared(ply: &Judged, limits: &Thresholds) -> Option<String> {
+fn over_sheared(ply: &Judged) -> Option<String> {
     let of = &ply.found.summary;
-    let share = of.over_shear_area / ply.area;
+    let share = of.over_shear_area? / ply.area;
+    let limits = of.over_shear?;
     (share > MUCH).then(|| {
         format!(
-            "{:.0} % of ply '{}' counts as over-sheared (shear from {:.1} to {:.1} deg; over_shear_positive: {:.1} deg, over_shear_negative: {:.1} deg): \
-             are these the angles from which this fabric wrinkles? The defaults are those of a non-crimp fabric; the thesis' woven one begins \
-             to wrinkle at 50 deg of either sign (a bias extension test tells)",
+            "{:.0} % of ply '{}' counts as over-sheared (shear from {:.1} to {:.1} deg; {}): are these the angles from which this fabric \
+             wrinkles? A non-crimp fabric may wrinkle at 8 deg, where its stitch is stretched, and a woven one at 50 deg of either sign; a \
+             bias-extension test tells",
             100.0 * share,
             ply.name,
             of.shear_min.to_degrees(),
             of.shear_max.to_degrees(),
-            limits.over_shear_positive.to_degrees(),
-            limits.over_shear_negative.to_degrees()
+            shear::told(limits)
         )
     })
 }
@@ -298,6 +312,15 @@ fn maps(plies: &[Judged]) -> Vec<Map> {
     judged.chunks(MOST_PANELS).map(map).collect()
 }
 
+/// The over-sheared area of the plies whose shear is judged; none where none is.
+fn shear_area(host: &Host, plies: &[Judged]) -> Result<(), StepError> {
+    let judged = (plies.iter()).filter_map(|p| p.found.summary.over_shear_area);
+    match judged.reduce(|sum, a| sum + a) {
+        Some(area) => host.result("over_shear_area", area, "m2"),
+        None => Ok(()),
+    }
+}
+
 fn write(
     host: &Host,
     time: f64,
@@ -313,7 +336,7 @@ fn write(
     }
     host.end_frame()?;
     host.write_attributes(&Defects {
-        thresholds: parameters.told(),
+        thresholds: parameters.told(plies),
         plies: plies.iter().map(|p| p.found.summary.clone()).collect(),
         maps: maps(plies),
     })?;
@@ -333,7 +356,7 @@ fn write(
         host.result("buckling_area", area, "m2")?;
         host.result("buckling_excess", most, "1")?;
     }
-    host.result("over_shear_area", all(|s| s.over_shear_area).sum(), "m2")?;
+    shear_area(host, plies)?;
     host.result(
         "poor_conformity_area",
         all(|s| s.poor_conformity_area).sum(),

@@ -85,7 +85,8 @@ fn formed(z: impl Fn(f64, f64) -> f64, shear: impl Fn(usize) -> f64) -> MemoryAr
     MemoryArtifact {
         kind: "forming".into(),
         attributes: json!({"sheets": [{"name": "film", "kind": "diaphragm", "thickness": 0.00008, "offset": 0.00004},
-                                      {"name": "ply_1", "kind": "ply", "thickness": 0.0004, "offset": OFFSET}]}),
+                                      {"name": "ply_1", "kind": "ply", "material": "NCF", "thickness": 0.0004, "offset": OFFSET,
+                                       "over_shear": {"positive": f64::to_radians(8.0), "negative": f64::to_radians(-50.0)}}]}),
         times: vec![0.0, 1.0],
         bodies: vec![tool(), ply],
         ..Default::default()
@@ -364,4 +365,95 @@ fn a_run_that_draped_all_of_a_ply_or_is_no_net_is_judged_as_before() {
     assert!(plain.log.is_empty() && all.log.is_empty());
     assert_eq!(all.bodies, plain.bodies);
     assert!(plain.result("poor_conformity_area") > 0.0);
+}
+
+/// A ply of a material without limits: nothing is flagged however far it is sheared, no area is told, and the log says why.
+#[test]
+fn shear_of_a_material_without_limits_is_not_judged_and_that_is_told() {
+    let mut input = formed(|_, _| OFFSET, |_| f64::to_radians(70.0));
+    let sheet = &mut input.attributes["sheets"][1];
+    sheet.as_object_mut().unwrap().remove("over_shear");
+    let found = detect(&input);
+    assert!(!found.results.contains_key("over_shear_area"));
+    assert_eq!(found.result("flagged_area"), 0.0);
+    let ply = &found.attributes["plies"][0];
+    assert_eq!(ply.get("over_shear_area"), None);
+    assert_eq!(ply.get("over_shear"), None);
+    let told = |found: &MemoryArtifact| {
+        let told = found.log.iter().find(|l| l.contains("is not judged"));
+        told.cloned()
+    };
+    let text = told(&found).unwrap();
+    for part in ["shear of 'ply_1'", "'NCF'", "over_shear: {positive: 8 deg"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    // Asked of the step, they count for every ply; of one sign alone, for that.
+    let limits = json!({"over_shear_negative": -0.5});
+    let found = run::<DefectDetection>(limits, &[MemoryInput::new("formed", &input)], &[]).unwrap();
+    assert_eq!(found.result("over_shear_area"), 0.0);
+    assert!(told(&found).unwrap().contains("positive shear of 'ply_1'"));
+    let limits = json!({"over_shear_positive": 1.0, "over_shear_negative": -0.5});
+    let found = run::<DefectDetection>(limits, &[MemoryInput::new("formed", &input)], &[]).unwrap();
+    assert!((found.result("over_shear_area") - 0.02).abs() < 1e-12);
+    assert_eq!(told(&found), None);
+}
+
+/// Plies of two fabrics: each is judged by its own limits, and the artifact tells of the whole what they share. Of two without limits
+/// one text tells.
+#[test]
+fn each_ply_is_judged_by_the_limits_of_its_own_material() {
+    let mut input = formed(|_, _| OFFSET, |_| f64::to_radians(20.0));
+    let limits = |positive: f64| json!({"positive": f64::to_radians(positive), "negative": f64::to_radians(-50.0)});
+    let sheets = input.attributes["sheets"].as_array_mut().unwrap();
+    let ncf = sheets[1].clone();
+    let more = [
+        ("ply_2", "woven", Some(limits(50.0))),
+        ("ply_3", "cloth", None),
+        ("ply_4", "cloth", None),
+    ];
+    for (name, material, over_shear) in more {
+        let mut sheet = ncf.clone();
+        sheet["name"] = json!(name);
+        sheet["material"] = json!(material);
+        match over_shear {
+            Some(limits) => sheet["over_shear"] = limits,
+            None => drop(sheet.as_object_mut().unwrap().remove("over_shear")),
+        }
+        sheets.push(sheet);
+    }
+    for name in ["ply_2", "ply_3", "ply_4"] {
+        let mut body = input.bodies[1].clone();
+        body.name = name.into();
+        input.bodies.push(body);
+    }
+    let found = detect(&input);
+    let area = |k: usize| {
+        found.attributes["plies"][k]
+            .get("over_shear_area")
+            .and_then(|a| a.as_f64())
+    };
+    assert!((area(0).unwrap() - 0.02).abs() < 1e-12);
+    assert_eq!((area(1), area(2), area(3)), (Some(0.0), None, None));
+    assert!((found.result("over_shear_area") - 0.02).abs() < 1e-12);
+    let thresholds = &found.attributes["thresholds"];
+    assert_eq!(thresholds.get("over_shear_positive"), None);
+    assert_eq!(thresholds.get("over_shear_negative"), None);
+    let told: Vec<&String> = found
+        .log
+        .iter()
+        .filter(|l| l.contains("is not judged"))
+        .collect();
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(
+        told[0].contains("shear of 'ply_3', 'ply_4' is not judged: the material 'cloth'"),
+        "{told:?}"
+    );
+    // Without the two, the plies share their limit of negative shear.
+    let sheets = input.attributes["sheets"].as_array_mut().unwrap();
+    sheets.truncate(3);
+    let found = detect(&input);
+    let thresholds = &found.attributes["thresholds"];
+    assert_eq!(thresholds.get("over_shear_positive"), None);
+    let negative = thresholds["over_shear_negative"].as_f64().unwrap();
+    assert!((negative - f64::to_radians(-50.0)).abs() < 1e-12);
 }

@@ -324,6 +324,7 @@ fn sheet(d: &Done) -> Sheet {
     Sheet {
         material: Some(material.name.clone()),
         areal_mass: Some(material.areal_mass.si()),
+        over_shear: material.over_shear.map(Into::into),
         added_mass: Some(0.0),
         fibre_1: Some(first),
         fibre_2: Some(second),

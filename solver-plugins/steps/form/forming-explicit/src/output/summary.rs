@@ -28,6 +28,7 @@ fn sheet_attributes(forming: &Forming, p: &Parameters) -> Vec<artifact::Sheet> {
             let mut sheet = artifact::Sheet {
                 material: Some(s.material.name.clone()),
                 areal_mass: Some(s.material.areal_mass.si()),
+                over_shear: s.material.over_shear.map(Into::into),
                 added_mass: Some(added),
                 element: Some(choice.plugin.clone()),
                 regions: regions::attributes(&s.scene),
