@@ -1,5 +1,6 @@
 //! Makes a run of a scene.
 
+pub mod apart;
 pub mod bag;
 pub mod bag_contacts;
 pub mod feedback;
@@ -7,6 +8,7 @@ pub mod films;
 pub mod layout;
 pub mod plates;
 pub mod press;
+pub mod stamping;
 pub mod zone;
 
 pub use feedback::feed_back;
@@ -19,6 +21,7 @@ use crate::stack::Components;
 use bag::build_bag;
 use plyflow_model::scene::Process;
 use press::build_press;
+use stamping::build_stamping;
 
 /// Builds the model of a whole scene.
 ///
@@ -28,5 +31,6 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
     match &p.scene.process {
         Process::DoubleDiaphragm(process) => build_bag(p, process, components),
         Process::Press(press) => build_press(p, press, components),
+        Process::Stamping(stamping) => build_stamping(p, stamping, components),
     }
 }

@@ -9,8 +9,8 @@ use crate::forming::Forming;
 use crate::load::{HeldByForce, Load, PressLoad, Stroke};
 use crate::request::Parameters;
 use crate::stack::{
-    Components, Elements, Parts, Placed, RigidBody, RigidName, RigidPart, StackContacts,
-    StackPlace, StackSheet, ToolSurface, layers, sheet, symmetry, tool,
+    Components, Elements, Parts, Placed, PlateMesh, RigidBody, RigidName, RigidPart, RigidShape,
+    StackContacts, StackPlace, StackSheet, ToolSurface, layers, sheet, symmetry, tool,
 };
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::Vec3;
@@ -55,7 +55,8 @@ pub fn build_press(p: &Parameters, press: &Press, components: &dyn Components) -
             Some(Towards::Holder) => -STANDARD_GRAVITY,
         },
     ]);
-    add_contacts(&mut model, &stack, parts.placed, &plates, tool.field, p)?;
+    let rigid = rigid_parts(&plates, tool.field);
+    add_contacts(&mut model, &stack, parts.placed, &rigid, p)?;
     model.add_plane_contacts(&p.contact_settings());
     let mut load = press_load(press, &plates, &model);
     load.apply(&mut model, 0.0);
@@ -65,9 +66,13 @@ pub fn build_press(p: &Parameters, press: &Press, components: &dyn Components) -
     let reach = reference.iter().map(from_axis).fold(0.0, f64::max);
     let (mut rigid, mut field_errors) = (Vec::new(), vec![(RigidName::Tool, tool.error)]);
     for (name, plate) in plates.named() {
-        let body = RigidBody::plate(name, &plate, reach);
-        field_errors.push((name, body.error_against(&plate)));
-        rigid.push(body);
+        let mesh = PlateMesh::new(&plate, reach);
+        field_errors.push((name.clone(), mesh.error_against(&plate)));
+        rigid.push(RigidBody {
+            name,
+            above: plate.side > 0.0,
+            shape: RigidShape::Plate(mesh),
+        });
     }
     Ok(Forming {
         model,
@@ -119,13 +124,12 @@ fn press_load(press: &Press, plates: &Plates, model: &Model) -> PressLoad {
     }
 }
 
-/// Plies on each other, and on rigid parts.
-fn add_contacts(
+/// Plies on each other, and on the rigid parts of a press.
+pub fn add_contacts(
     model: &mut Model,
     stack: &[StackSheet],
     mut placed: Vec<Placed>,
-    plates: &Plates,
-    punch: SignedDistanceGrid,
+    rigid: &[RigidPart],
     p: &Parameters,
 ) -> Result<()> {
     for ply in &mut placed {
@@ -137,12 +141,12 @@ fn add_contacts(
         contacts.add_pair(model, pair[1], pair[0], 1.0)?;
     }
     contacts.add_past(model, &plies)?;
-    for part in rigid_parts(plates, punch) {
+    for part in rigid {
         for ply in &plies {
             let k = ply.place.0;
             let among = if part.above { k + 1..plies.len() } else { 0..k };
             let among: Vec<StackPlace> = among.map(StackPlace).collect();
-            contacts.add_rigid(model, &part, *ply, &among)?;
+            contacts.add_rigid(model, part, *ply, &among)?;
         }
     }
     for ply in &plies {
@@ -155,11 +159,11 @@ fn add_contacts(
 /// Punch, die, and holder if there is one.
 fn rigid_parts(plates: &Plates, punch: SignedDistanceGrid) -> Vec<RigidPart> {
     let part = |name: RigidName, surface: Arc<dyn RigidSurface>| RigidPart {
-        name,
         surface,
         above: name == RigidName::Die,
         film: None,
         moves: name != RigidName::Die,
+        name,
     };
     let mut parts = vec![part(RigidName::Tool, Arc::new(ToolSurface(punch)))];
     parts.extend(
