@@ -217,7 +217,7 @@ impl<'a> Block<'a> {
         }
         let face = self.words.face.si();
         let back = self.shape.wall + self.shape.radius + CROWN;
-        let mut loop_at = |z: f64, mesh: &mut ToolMesh| -> Vec<u32> {
+        let loop_at = |z: f64, mesh: &mut ToolMesh| -> Vec<u32> {
             outline.iter().map(|p| mesh.push([p[0], p[1], z])).collect()
         };
         let low = loop_at(face, &mut self.mesh);

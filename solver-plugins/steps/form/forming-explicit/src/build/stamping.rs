@@ -10,7 +10,7 @@ use crate::load::{ForceInTime, Grip, Load, Motion, MovedPart, PressedPart, Stamp
 use crate::request::Parameters;
 use crate::stack::{
     Components, Elements, PartSurface, Parts, RigidBody, RigidName, RigidPart, RigidShape,
-    StackSheet, sheet, symmetry, tool,
+    sheet, symmetry, tool,
 };
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::Vec3;

@@ -81,7 +81,7 @@ impl RigidBody {
     }
 
     /// Its cells, one after the other, and how many points each has.
-    pub fn cells(&self) -> (u32, &[u32]) {
+    pub fn cells(&self) -> (usize, &[u32]) {
         match &self.shape {
             RigidShape::Plate(plate) => (4, plate.cells.as_flattened()),
             RigidShape::Triangles(mesh) => (3, mesh.triangles.as_flattened()),
