@@ -293,7 +293,10 @@ fn files_of_the_parts_of_a_stamping_are_absolute_and_hashed() {
                     tool: {stl: {file: ./materials/../die.stl, unit: 1 mm}}\n        motion: {table: [{time: 0 ms, way: 9 mm}, {time: 20 ms, way: 0 mm}]}\n";
     let head = &scene[..at("sheets:")];
     let friction = "friction: {tool_fabric: 0.2}\n";
-    study.write("scene.yaml", &format!("{head}sheets:\n{ply}{friction}{stamping}"));
+    study.write(
+        "scene.yaml",
+        &format!("{head}sheets:\n{ply}{friction}{stamping}"),
+    );
     let w = study
         .load()
         .unwrap_or_else(|e| panic!("{}", e.render(false)));
@@ -303,7 +306,10 @@ fn files_of_the_parts_of_a_stamping_are_absolute_and_hashed() {
     assert_eq!(coarse.files[0].pointer, pointer);
     assert_eq!(coarse.files[0].path, study.path("die.stl"));
     let parameters = json!(coarse.parameters);
-    assert_eq!(parameters.pointer(pointer), Some(&json!(study.path("die.stl"))));
+    assert_eq!(
+        parameters.pointer(pointer),
+        Some(&json!(study.path("die.stl")))
+    );
 }
 
 #[test]

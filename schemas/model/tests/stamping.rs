@@ -53,7 +53,10 @@ fn a_body_of_another_step_is_asked_for_at_its_part() {
     let scene = read(stamped(|s| {
         s["process"]["stamping"]["parts"][1]["tool"] = json!({"input": {"body": "block"}});
     }));
-    let asked: Vec<(String, AskedFor)> = asks(&scene).into_iter().map(|(p, a)| (p.to_string(), a)).collect();
+    let asked: Vec<(String, AskedFor)> = asks(&scene)
+        .into_iter()
+        .map(|(p, a)| (p.to_string(), a))
+        .collect();
     let path = "process.stamping.parts[1].tool.input.body".to_owned();
     assert_eq!(asked, [(path, AskedFor::Body("block".into()))]);
 }
@@ -64,42 +67,160 @@ type Change = fn(&mut Value);
 #[test]
 fn what_makes_no_stamping_is_refused_with_its_place_and_what_is_expected() {
     let cases: [(Change, Rule, &str, &str); 24] = [
-        (|s| s["parts"][1]["name"] = json!("die"), Rule::Name, "parts[1].name: the name `die` is taken", "a name of its own"),
-        (|s| s["parts"][1]["name"] = json!("a"), Rule::Name, "sheets[0].name: the name `a` is taken", "those of rigid parts"),
-        (|s| s["parts"][1]["name"] = json!("bed"), Rule::Name, "parts[1].name: the name `bed` is taken", "other than `bed`"),
-        (|s| s["parts"][1]["name"] = json!("a b"), Rule::Name, "parts[1].name: `a b` cannot name a body", "letters"),
-        (|s| s["parts"][1]["tool"] = Value::Null, Rule::Press, "the part `pad` has no surface", "`tool: ..` or `matching: ..`"),
-        (|s| s["parts"][0]["tool"] = s["parts"][1]["tool"].clone(), Rule::Press, "the part `die` has two surfaces", "one of them"),
-        (|s| s["parts"][1]["name"] = json!("tool"), Rule::Press, "parts[1].tool: `tool` stands at the part `tool`", "another name"),
-        (|s| s["parts"][1]["tool"]["flat"]["fillet"] = json!("30 mm"), Rule::Tool, "process.stamping.parts[1].tool.flat", "mm"),
-        (|s| s["parts"][1]["up"] = json!([0, 0, 0]), Rule::Tool, "parts[1].up: the vector has no length", "an axis"),
-        (|s| s["parts"][1]["direction"] = json!([0, 0, 0]), Rule::Press, "parts[1].direction: the vector has no length", "an axis"),
-        (|s| s["parts"][0]["side"] = json!("below"), Rule::Press, "a matching die below the plies", "`side: above`"),
-        (|s| s["parts"][0]["foot"] = json!("1 mm"), Rule::Press, "a matching die has its place from the tool", "leave out"),
-        (|s| s["parts"][0]["matching"]["gap"] = json!("0.3 mm"), Rule::Press, "matching.gap: given 0.3 mm", "0.4 mm thick"),
-        (|s| s["parts"][0]["matching"]["face"] = json!("21 mm"), Rule::Press, "matching.face: given 21 mm", "`wall` of the double dome (30 mm)"),
-        (|s| s["parts"][0]["matching"]["length"] = json!("320 mm"), Rule::Press, "matching.length: given 320 mm", "more than 321 mm"),
-        (|s| s["parts"][0]["motion"]["table"] = json!([]), Rule::Press, "table: the table has no row", "two or more"),
-        (|s| s["parts"][0]["motion"]["table"][0]["time"] = json!("1 ms"), Rule::Press, "table[0].time: given 1 ms", "`0 s` in the first row"),
-        (|s| s["parts"][0]["motion"]["table"][1]["time"] = json!("0 ms"), Rule::Press, "table[1].time: given 0 ms", "more than the 0 ms"),
-        (|s| s["parts"][0]["motion"]["table"][1]["time"] = json!("101 ms"), Rule::Press, "table[1].time: given 101 ms", "`forming_time` (100 ms)"),
-        (|s| s["parts"][1]["motion"]["pressed"]["force"] = json!("-1 N"), Rule::Press, "pressed.force: given -1 N", "0 N or more"),
+        (
+            |s| s["parts"][1]["name"] = json!("die"),
+            Rule::Name,
+            "parts[1].name: the name `die` is taken",
+            "a name of its own",
+        ),
+        (
+            |s| s["parts"][1]["name"] = json!("a"),
+            Rule::Name,
+            "sheets[0].name: the name `a` is taken",
+            "those of rigid parts",
+        ),
+        (
+            |s| s["parts"][1]["name"] = json!("bed"),
+            Rule::Name,
+            "parts[1].name: the name `bed` is taken",
+            "other than `bed`",
+        ),
+        (
+            |s| s["parts"][1]["name"] = json!("a b"),
+            Rule::Name,
+            "parts[1].name: `a b` cannot name a body",
+            "letters",
+        ),
+        (
+            |s| s["parts"][1]["tool"] = Value::Null,
+            Rule::Press,
+            "the part `pad` has no surface",
+            "`tool: ..` or `matching: ..`",
+        ),
+        (
+            |s| s["parts"][0]["tool"] = s["parts"][1]["tool"].clone(),
+            Rule::Press,
+            "the part `die` has two surfaces",
+            "one of them",
+        ),
+        (
+            |s| s["parts"][1]["name"] = json!("tool"),
+            Rule::Press,
+            "parts[1].tool: `tool` stands at the part `tool`",
+            "another name",
+        ),
+        (
+            |s| s["parts"][1]["tool"]["flat"]["fillet"] = json!("30 mm"),
+            Rule::Tool,
+            "process.stamping.parts[1].tool.flat",
+            "mm",
+        ),
+        (
+            |s| s["parts"][1]["up"] = json!([0, 0, 0]),
+            Rule::Tool,
+            "parts[1].up: the vector has no length",
+            "an axis",
+        ),
+        (
+            |s| s["parts"][1]["direction"] = json!([0, 0, 0]),
+            Rule::Press,
+            "parts[1].direction: the vector has no length",
+            "an axis",
+        ),
+        (
+            |s| s["parts"][0]["side"] = json!("below"),
+            Rule::Press,
+            "a matching die below the plies",
+            "`side: above`",
+        ),
+        (
+            |s| s["parts"][0]["foot"] = json!("1 mm"),
+            Rule::Press,
+            "a matching die has its place from the tool",
+            "leave out",
+        ),
+        (
+            |s| s["parts"][0]["matching"]["gap"] = json!("0.3 mm"),
+            Rule::Press,
+            "matching.gap: given 0.3 mm",
+            "0.4 mm thick",
+        ),
+        (
+            |s| s["parts"][0]["matching"]["face"] = json!("21 mm"),
+            Rule::Press,
+            "matching.face: given 21 mm",
+            "`wall` of the double dome (30 mm)",
+        ),
+        (
+            |s| s["parts"][0]["matching"]["length"] = json!("320 mm"),
+            Rule::Press,
+            "matching.length: given 320 mm",
+            "more than 321 mm",
+        ),
+        (
+            |s| s["parts"][0]["motion"]["table"] = json!([]),
+            Rule::Press,
+            "table: the table has no row",
+            "two or more",
+        ),
+        (
+            |s| s["parts"][0]["motion"]["table"][0]["time"] = json!("1 ms"),
+            Rule::Press,
+            "table[0].time: given 1 ms",
+            "`0 s` in the first row",
+        ),
+        (
+            |s| s["parts"][0]["motion"]["table"][1]["time"] = json!("0 ms"),
+            Rule::Press,
+            "table[1].time: given 0 ms",
+            "more than the 0 ms",
+        ),
+        (
+            |s| s["parts"][0]["motion"]["table"][1]["time"] = json!("101 ms"),
+            Rule::Press,
+            "table[1].time: given 101 ms",
+            "`forming_time` (100 ms)",
+        ),
+        (
+            |s| s["parts"][1]["motion"]["pressed"]["force"] = json!("-1 N"),
+            Rule::Press,
+            "pressed.force: given -1 N",
+            "0 N or more",
+        ),
         (
             |s| s["parts"][1]["motion"]["pressed"] = json!({"force": "0 N"}),
             Rule::Press,
             "neither a force nor a spring presses the part",
             "more than 0 N",
         ),
-        (|s| s["parts"] = json!([]), Rule::Press, "parts: no part moves", "`motion: {table: [..]}`"),
-        (|s| s["grippers"][0]["ply"] = json!("b"), Rule::Press, "grippers[0].ply: no ply of this scene is called `b`", "`a`"),
-        (|s| s["grippers"][0]["centre"] = json!(["250 mm", "0 mm"]), Rule::Press, "the gripper holds no place of `a`", "onto the ply"),
+        (
+            |s| s["parts"] = json!([]),
+            Rule::Press,
+            "parts: no part moves",
+            "`motion: {table: [..]}`",
+        ),
+        (
+            |s| s["grippers"][0]["ply"] = json!("b"),
+            Rule::Press,
+            "grippers[0].ply: no ply of this scene is called `b`",
+            "`a`",
+        ),
+        (
+            |s| s["grippers"][0]["centre"] = json!(["250 mm", "0 mm"]),
+            Rule::Press,
+            "the gripper holds no place of `a`",
+            "onto the ply",
+        ),
     ];
     for (change, rule, says, expects) in cases {
         let scene = read(stamped(|s| change(&mut s["process"]["stamping"])));
         let fault = rules::check(&scene).expect_err(says);
         let text = fault.to_string();
         assert_eq!(fault.rule, rule, "{text}");
-        assert!(text.contains(says) && text.contains(expects), "'{says}' and '{expects}' in: {text}");
+        assert!(
+            text.contains(says) && text.contains(expects),
+            "'{says}' and '{expects}' in: {text}"
+        );
     }
 }
 
@@ -116,7 +237,13 @@ fn beside_a_mirror_plane_nothing_moves_across_it_and_nothing_grips() {
         s["grippers"] = json!([]);
         s["parts"][1]["direction"] = json!([1, 0, -1]);
     });
-    assert!(across.contains("`pad` moves across the mirror plane x = 0"), "{across}");
+    assert!(
+        across.contains("`pad` moves across the mirror plane x = 0"),
+        "{across}"
+    );
     let grips = told(|_| {});
-    assert!(grips.contains("grippers") && grips.contains("`symmetry`"), "{grips}");
+    assert!(
+        grips.contains("grippers") && grips.contains("`symmetry`"),
+        "{grips}"
+    );
 }

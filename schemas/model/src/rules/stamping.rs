@@ -169,38 +169,38 @@ fn matching(
     die: &MatchingDie,
     path: &Path,
 ) -> Option<Fault> {
-    let fault = |path: Path, value: f64| Fault::given(Rule::Press, path, mm(value));
+    let text = |text: &str| Fault::text(Rule::Press, path.clone(), text).shown(Shown::Key);
     if part.side == Side::Below {
-        let fault = Fault::text(Rule::Press, path.clone(), "a matching die below the plies");
         return Some(
-            fault
-                .shown(Shown::Key)
+            text("a matching die below the plies")
                 .expected("`side: above`: the scene's tool, which it closes over, is below"),
         );
     }
     if !part.place().only_moves() || part.translate.iter().any(|t| t.si() != 0.0) {
-        let fault = Fault::text(
-            Rule::Press,
-            path.clone(),
-            "a matching die has its place from the tool",
-        );
         return Some(
-            fault
-                .shown(Shown::Key)
+            text("a matching die has its place from the tool")
                 .help("leave out `translate`, `up`, `rotate`, `centre` and `foot` of this part"),
         );
     }
-    let dome = match known.tool? {
-        Tool::DoubleDome(dome) => dome,
-        _ => {
-            let fault = Fault::text(
-                Rule::Press,
-                path.clone(),
-                "the scene's tool is no `double_dome`",
-            );
-            return Some(fault.shown(Shown::Key).help("only a double dome's die is made from its words; draw another one and give it as `tool: {stl: ..}`"));
-        }
+    let Tool::DoubleDome(dome) = known.tool? else {
+        return Some(text("the scene's tool is no `double_dome`").help(
+            "only a double dome's die is made from its words; draw another one and give it as `tool: {stl: ..}`",
+        ));
     };
+    sizes(dome, die, path).or_else(|| {
+        let (gap, thickness) = (die.gap.si(), stack_thickness(known)?);
+        (gap < thickness * (1.0 - SAME)).then(|| {
+            Fault::given(Rule::Press, path.key("gap"), mm(gap)).expected(format!(
+                "a gap that the plies fit into, which are {} thick",
+                mm(thickness)
+            ))
+        })
+    })
+}
+
+/// Sizes of a die that make no block with a hollow and a rounded edge.
+fn sizes(dome: &DoubleDomeTool, die: &MatchingDie, path: &Path) -> Option<Fault> {
+    let fault = |key: &str, value: f64| Fault::given(Rule::Press, path.key(key), mm(value));
     for (key, value) in [
         ("gap", die.gap),
         ("edge_radius", die.edge_radius),
@@ -208,40 +208,35 @@ fn matching(
         ("width", die.width),
     ] {
         if !(value.si() > 0.0 && value.si().is_finite()) {
-            return Some(fault(path.key(key), value.si()).expected("more than 0 mm"));
+            return Some(fault(key, value.si()).expected("more than 0 mm"));
         }
     }
     let (gap, edge, face) = (die.gap.si(), die.edge_radius.si(), die.face.si());
     if !(face >= 0.0 && face + edge <= dome.wall.si() + SAME) {
-        return Some(fault(path.key("face"), face).expected(format!(
+        return Some(fault("face", face).expected(format!(
             "from 0 mm to the `wall` of the double dome ({}) less `edge_radius` ({}): the hollow's wall ends in the rounding",
             mm(dome.wall.si()),
             mm(edge)
         )));
     }
     if gap + edge >= dome.waist_radius.si() {
-        return Some(fault(path.key("edge_radius"), edge).expected(format!(
+        return Some(fault("edge_radius", edge).expected(format!(
             "less than `waist_radius` ({}) less `gap`: there the rounding meets itself",
             mm(dome.waist_radius.si())
         )));
     }
     let least = least_block(dome, gap + edge);
-    for (key, value, least) in [
+    let sides = [
         ("length", die.length, least[0]),
         ("width", die.width, least[1]),
-    ] {
-        if value.si() <= least {
-            return Some(fault(path.key(key), value.si()).expected(format!(
-                "more than {}, what the hollow takes with its rounded edge",
-                mm(least)
-            )));
-        }
-    }
-    let thickness = stack_thickness(known)?;
-    (gap < thickness * (1.0 - SAME)).then(|| {
-        fault(path.key("gap"), gap).expected(format!(
-            "a gap that the plies fit into, which are {} thick",
-            mm(thickness)
+    ];
+    let small = sides
+        .into_iter()
+        .find(|(_, value, least)| value.si() <= *least);
+    small.map(|(key, value, least)| {
+        fault(key, value.si()).expected(format!(
+            "more than {}, what the hollow takes with its rounded edge",
+            mm(least)
         ))
     })
 }

@@ -79,7 +79,9 @@ fn triangles(
     };
     if let Some(die) = &part.matching {
         let Tool::DoubleDome(dome) = &scene.tool else {
-            return Err(format!("{at}.matching: the scene's tool is no `double_dome`"));
+            return Err(format!(
+                "{at}.matching: the scene's tool is no `double_dome`"
+            ));
         };
         let mesh = double_dome::die(dome, die).map_err(|text| format!("{at}.matching: {text}"))?;
         return Ok(mesh);
@@ -104,7 +106,12 @@ fn triangles(
 ///
 /// # Errors
 /// As [`triangles`]; and where the field is off by more than a tenth of the thinnest ply, with the spacing that would do.
-pub fn rigid(scene: &Scene, stamping: &Stamping, k: usize, spacing: f64) -> Result<PartTool, String> {
+pub fn rigid(
+    scene: &Scene,
+    stamping: &Stamping,
+    k: usize,
+    spacing: f64,
+) -> Result<PartTool, String> {
     let (part, at) = words(stamping, k);
     let mesh = triangles(scene, stamping, k, spacing)?;
     let hangs = part.side == Side::Above;

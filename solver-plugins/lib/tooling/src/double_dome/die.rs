@@ -210,7 +210,8 @@ impl<'a> Block<'a> {
         for corner in [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]] {
             let corner = [0, 1].map(|k| corner[k] * half[k]);
             let far = |p: &[f64; 2]| (p[0] - corner[0]).fixed_hypot(p[1] - corner[1]);
-            let nearest = (0..outline.len()).min_by(|a, b| far(&outline[*a]).total_cmp(&far(&outline[*b])));
+            let nearest =
+                (0..outline.len()).min_by(|a, b| far(&outline[*a]).total_cmp(&far(&outline[*b])));
             if let Some(k) = nearest {
                 outline[k] = corner;
             }
@@ -226,7 +227,9 @@ impl<'a> Block<'a> {
         self.band(&low, &high);
         let middle = self.mesh.push([0.0, 0.0, back]);
         for k in 0..high.len() {
-            self.mesh.triangles.push([high[k], high[(k + 1) % high.len()], middle]);
+            self.mesh
+                .triangles
+                .push([high[k], high[(k + 1) % high.len()], middle]);
         }
     }
 
@@ -241,8 +244,8 @@ impl<'a> Block<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::double_dome::double_dome;
     use crate::SurfaceTree;
+    use crate::double_dome::double_dome;
 
     fn dome() -> DoubleDomeTool {
         let text = "dome_radius: 60 mm\ndome_distance: 180 mm\nwaist_radius: 150 mm\nwall: 30 mm\nfacet_size: 8 mm\n";
@@ -261,11 +264,18 @@ mod tests {
         assert!(die.is_watertight() && die.volume() > 0.0);
         let punch = SurfaceTree::new(&double_dome(&dome));
         // Points of hollow and wall, but not of its rounded edge: each as far from the dome as the gap.
-        let inner = |p: &&[f64; 3]| p[2] > 0.0225 && p[2] < 0.0929 && {
-            let [x, y] = [p[0].abs(), p[1].abs()];
-            x < 0.155 && y < 0.1
+        let inner = |p: &&[f64; 3]| {
+            p[2] > 0.0225 && p[2] < 0.0929 && {
+                let [x, y] = [p[0].abs(), p[1].abs()];
+                x < 0.155 && y < 0.1
+            }
         };
-        let all: Vec<f64> = die.points.iter().filter(inner).map(|p| punch.closest(*p).signed_distance).collect();
+        let all: Vec<f64> = die
+            .points
+            .iter()
+            .filter(inner)
+            .map(|p| punch.closest(*p).signed_distance)
+            .collect();
         assert!(all.len() > 500);
         let off = all.iter().map(|d| (d - 1.5e-3).abs()).fold(0.0, f64::max);
         assert!(off < 2.0 * CHORD_TOLERANCE, "{off}");
@@ -276,7 +286,10 @@ mod tests {
             (high, [0.21, 0.13, 0.03 + 0.0615 + CROWN]),
         ] {
             for k in 0..3 {
-                assert!((found[k] - expected[k]).abs() < 1e-9, "{found:?} {expected:?}");
+                assert!(
+                    (found[k] - expected[k]).abs() < 1e-9,
+                    "{found:?} {expected:?}"
+                );
             }
         }
     }
@@ -294,15 +307,23 @@ mod tests {
             ([0.19, 0.1, 0.016], -0.004),
         ] {
             let found = tree.closest(p).signed_distance;
-            assert!((found - expected).abs() < 2.0 * CHORD_TOLERANCE, "{p:?}: {found}");
+            assert!(
+                (found - expected).abs() < 2.0 * CHORD_TOLERANCE,
+                "{p:?}: {found}"
+            );
         }
         // The rounding lies on its arc: in the section y = 0 through the pole its centre is `edge` out of the wall and over the face.
         let centre = [0.1515 + 0.01, 0.022];
-        let on_arc = |p: &&[f64; 3]| p[1] == 0.0 && p[0] > 0.1515 + 1e-6 && p[0] < 0.1615 - 1e-6 && p[2] < 0.03;
+        let on_arc = |p: &&[f64; 3]| {
+            p[1] == 0.0 && p[0] > 0.1515 + 1e-6 && p[0] < 0.1615 - 1e-6 && p[2] < 0.03
+        };
         let arc: Vec<f64> = (mesh.points.iter().filter(on_arc))
             .map(|p| (p[0] - centre[0]).hypot(p[2] - centre[1]))
             .collect();
-        assert!(arc.len() >= 3 && arc.iter().all(|r| (r - 0.01).abs() < 1e-12), "{arc:?}");
+        assert!(
+            arc.len() >= 3 && arc.iter().all(|r| (r - 0.01).abs() < 1e-12),
+            "{arc:?}"
+        );
     }
 
     #[test]
@@ -312,6 +333,9 @@ mod tests {
         deep.dome_radius = plyflow_model::units::Length(0.04);
         deep.waist_radius = plyflow_model::units::Length(0.085);
         let text = die(&deep, &words()).unwrap_err();
-        assert!(text.contains("waist_radius") && text.contains("stl"), "{text}");
+        assert!(
+            text.contains("waist_radius") && text.contains("stl"),
+            "{text}"
+        );
     }
 }

@@ -1,6 +1,6 @@
 //! Whether the parts of a stamping can do what they are to do: they reach plies, start beside them, and stay apart.
 
-use crate::build::stamping::Drawn;
+use crate::build::drawn::Drawn;
 use crate::error::{FormingError, Result};
 use crate::stack::{StackSheet, sheet};
 use crate::words::in_mm;
@@ -44,7 +44,11 @@ impl Reach {
     /// Thickness (m) of the plies that lie over a place, or will after they have been drawn in.
     fn thickness_at(&self, p: Vec3) -> f64 {
         let over = |b: &Rectangle| b[0] <= p[0] && p[0] <= b[2] && b[1] <= p[1] && p[1] <= b[3];
-        self.plies.iter().filter(|(b, _)| over(b)).map(|p| p.1).sum()
+        self.plies
+            .iter()
+            .filter(|(b, _)| over(b))
+            .map(|p| p.1)
+            .sum()
     }
 
     /// The corner of facets under or over the plies that `further` says is the furthest; none where no facet is.

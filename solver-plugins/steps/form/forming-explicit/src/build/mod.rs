@@ -3,6 +3,7 @@
 pub mod apart;
 pub mod bag;
 pub mod bag_contacts;
+pub mod drawn;
 pub mod feedback;
 pub mod films;
 pub mod layout;

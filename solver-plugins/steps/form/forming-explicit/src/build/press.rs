@@ -14,11 +14,11 @@ use crate::stack::{
 };
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::Vec3;
-use plyflow_mechanics::contact::RigidSurface;
+use plyflow_mechanics::contact::{OpenPlate, RigidSurface};
 use plyflow_mechanics::model::Model;
 use plyflow_model::STANDARD_GRAVITY;
 use plyflow_model::scene::{Hold, Press, Towards};
-use plyflow_tooling::SignedDistanceGrid;
+use plyflow_tooling::{FieldError, SignedDistanceGrid};
 use std::sync::Arc;
 
 /// Mass of a holder that a force presses, over that of the plies: heavy enough to follow their contacts stably in
@@ -64,16 +64,11 @@ pub fn build_press(p: &Parameters, press: &Press, components: &dyn Components) -
     // Largest distance of a point from the axis (m).
     let from_axis = |q: &Vec3| q[0].fixed_hypot(q[1]);
     let reach = reference.iter().map(from_axis).fold(0.0, f64::max);
-    let (mut rigid, mut field_errors) = (Vec::new(), vec![(RigidName::Tool, tool.error)]);
-    for (name, plate) in plates.named() {
-        let mesh = PlateMesh::new(&plate, reach);
-        field_errors.push((name.clone(), mesh.error_against(&plate)));
-        rigid.push(RigidBody {
-            name,
-            above: plate.side > 0.0,
-            shape: RigidShape::Plate(mesh),
-        });
-    }
+    let (rigid, errors) = shown(&plates, reach);
+    let field_errors = [(RigidName::Tool, tool.error)]
+        .into_iter()
+        .chain(errors)
+        .collect();
     Ok(Forming {
         model,
         load: Load::Press(load),
@@ -90,6 +85,21 @@ pub fn build_press(p: &Parameters, press: &Press, components: &dyn Components) -
         start: None,
         element_size: p.element_size,
     })
+}
+
+/// The plates as they are shown, out to a radius that covers `reach` (m), and by how much that is off.
+fn shown(plates: &Plates, reach: f64) -> (Vec<RigidBody>, Vec<(RigidName, FieldError)>) {
+    let of = |(name, plate): (RigidName, OpenPlate)| {
+        let mesh = PlateMesh::new(&plate, reach);
+        let error = (name.clone(), mesh.error_against(&plate));
+        let body = RigidBody {
+            name,
+            above: plate.side > 0.0,
+            shape: RigidShape::Plate(mesh),
+        };
+        (body, error)
+    };
+    plates.named().map(of).unzip()
 }
 
 /// What moves in the press, as it starts.

@@ -3,6 +3,7 @@
 //! The scene's tool is one of the parts, below the plies. Each part is described where it is drawn, and its contacts shift it by its way.
 
 use crate::build::apart::{Apart, Reach, check_apart, check_reach};
+use crate::build::drawn::{Drawn, drawn};
 use crate::build::press::add_contacts;
 use crate::error::{FormingError, Result};
 use crate::forming::Forming;
@@ -10,18 +11,14 @@ use crate::load::{ForceInTime, Grip, Load, Motion, MovedPart, PressedPart, Stamp
 use crate::request::Parameters;
 use crate::stack::{
     Components, Elements, PartSurface, Parts, RigidBody, RigidName, RigidPart, RigidShape,
-    sheet, symmetry, tool,
+    StackSheet, sheet, symmetry, tool,
 };
 use plyflow_fixed::FixedBits;
-use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::history::MonotoneCubic;
+use plyflow_mechanics::mirror::Planes;
 use plyflow_mechanics::model::Model;
 use plyflow_model::STANDARD_GRAVITY;
-use plyflow_model::scene::{
-    ForceCourse, Gripper, PartMotion, Pressed, Side, Stamping, StampingPart, Vertical,
-};
-use plyflow_model::stamping::TOOL;
-use plyflow_tooling::{FieldError, PartField, ToolMesh, part};
+use plyflow_model::scene::{ForceCourse, Gripper, PartMotion, Pressed, Side, Stamping, Vertical};
 use std::sync::Arc;
 
 /// Mass of all parts that are pressed, over that of the plies, and the least that each of them has. A part is moved by what the contacts gave in
@@ -29,61 +26,6 @@ use std::sync::Arc;
 const PRESSED_MASS: f64 = 5.0;
 /// Share of what keeps a node stable that the spring of a gripper may take.
 const MOST_SPRING: f64 = 0.1;
-
-/// A part as it is drawn, and how it moves.
-pub struct Drawn {
-    /// Which it is.
-    pub name: RigidName,
-    /// On which side of the plies.
-    pub side: Side,
-    /// Its triangles.
-    pub mesh: ToolMesh,
-    /// What contacts see.
-    pub field: PartField,
-    /// By how much both differ at most.
-    pub error: FieldError,
-    /// What the scene says of its motion.
-    pub words: Option<StampingPart>,
-}
-
-impl Drawn {
-    /// Unit vector in which its way counts.
-    pub fn outwards(&self) -> Vec3 {
-        let away = [0.0, 0.0, self.side.away()];
-        self.words.as_ref().map_or(away, StampingPart::outwards)
-    }
-
-    /// Whether what the plies do decides where it is.
-    pub fn is_pressed(&self) -> bool {
-        let motion = self.words.as_ref().and_then(|w| w.motion.as_ref());
-        matches!(motion, Some(PartMotion::Pressed(_)))
-    }
-
-    fn table(&self) -> Option<MonotoneCubic> {
-        match self.words.as_ref()?.motion.as_ref()? {
-            PartMotion::Table(rows) => {
-                let rows = rows.iter().map(|r| (r.time.si(), r.way.si()));
-                let (times, ways) = rows.unzip();
-                Some(MonotoneCubic::new(times, ways))
-            }
-            PartMotion::Pressed(_) => None,
-        }
-    }
-
-    /// Times (s) of its table; none of one that has none.
-    pub fn times(&self) -> Vec<f64> {
-        match self.words.as_ref().and_then(|w| w.motion.as_ref()) {
-            Some(PartMotion::Table(rows)) => rows.iter().map(|r| r.time.si()).collect(),
-            _ => Vec::new(),
-        }
-    }
-
-    /// Where it is at a time (s), as far as that is known before (m).
-    pub fn shift(&self, t: f64) -> Vec3 {
-        let way = self.table().map_or(0.0, |table| table.at(t));
-        self.outwards().map(|c| c * way)
-    }
-}
 
 /// Builds the model of a stamping.
 ///
@@ -99,22 +41,8 @@ pub fn build_stamping(
     let planes = symmetry::planes(scene);
     let tool = tool::rigid(p)?;
     let drawn = drawn(p, stamping, (&tool.mesh, tool.field, tool.error))?;
-    for part in &drawn {
-        symmetry::check_tool(planes, &part.mesh).map_err(|e| match e {
-            FormingError::Symmetry(text) => {
-                FormingError::Symmetry(format!("part `{}`: {text}", part.name.word()))
-            }
-            other => other,
-        })?;
-    }
-    let reach = Reach::new(&stack)?;
-    let blank = blank_height(stamping, &drawn, &reach)?;
-    check_reach(&drawn, &reach, blank, stamping.forming_time.si())?;
-    check_apart(&Apart {
-        parts: &drawn,
-        reach: &reach,
-        end: stamping.forming_time.si(),
-    })?;
+    check_mirrored(&drawn, planes)?;
+    let blank = laid(stamping, &drawn, &stack)?;
     let elements = Elements { p, components };
     let mut parts = Parts::default();
     parts.mirrors.planes = planes;
@@ -156,6 +84,32 @@ pub fn build_stamping(
     })
 }
 
+/// Whether every part is its own mirror image.
+fn check_mirrored(parts: &[Drawn], planes: Planes) -> Result<()> {
+    for part in parts {
+        symmetry::check_tool(planes, &part.mesh).map_err(|e| match e {
+            FormingError::Symmetry(text) => {
+                FormingError::Symmetry(format!("part `{}`: {text}", part.name.word()))
+            }
+            other => other,
+        })?;
+    }
+    Ok(())
+}
+
+/// Height (m) of the lower face of the lowest ply at the start, between parts that can do what they are to do.
+fn laid(stamping: &Stamping, parts: &[Drawn], stack: &[StackSheet]) -> Result<f64> {
+    let (reach, end) = (Reach::new(stack)?, stamping.forming_time.si());
+    let blank = blank_height(stamping, parts, &reach)?;
+    check_reach(parts, &reach, blank, end)?;
+    check_apart(&Apart {
+        parts,
+        reach: &reach,
+        end,
+    })?;
+    Ok(blank)
+}
+
 /// Acceleration of free fall along z (m/s2).
 fn fall(weight: Option<Vertical>) -> f64 {
     match weight {
@@ -163,35 +117,6 @@ fn fall(weight: Option<Vertical>) -> f64 {
         Some(Vertical::Up) => STANDARD_GRAVITY,
         Some(Vertical::Down) => -STANDARD_GRAVITY,
     }
-}
-
-/// All parts, the scene's tool first.
-fn drawn(
-    p: &Parameters,
-    stamping: &Stamping,
-    (mesh, field, error): (&ToolMesh, plyflow_tooling::SignedDistanceGrid, FieldError),
-) -> Result<Vec<Drawn>> {
-    let mut all = vec![Drawn {
-        name: RigidName::Tool,
-        side: Side::Below,
-        mesh: mesh.clone(),
-        field: PartField::standing(field),
-        error,
-        words: stamping.parts.iter().find(|w| w.name == TOOL).cloned(),
-    }];
-    let others = stamping.parts.iter().enumerate();
-    for (k, words) in others.filter(|(_, w)| w.name != TOOL) {
-        let made = part::rigid(&p.scene, stamping, k, p.tool_grid).map_err(FormingError::Tool)?;
-        all.push(Drawn {
-            name: RigidName::Part(Arc::from(words.name.as_str())),
-            side: words.side,
-            mesh: made.mesh,
-            field: made.field,
-            error: made.error,
-            words: Some(words.clone()),
-        });
-    }
-    Ok(all)
 }
 
 /// The part as the sheets meet it.
@@ -262,7 +187,10 @@ fn force(words: &Pressed, copies: f64) -> ForceInTime {
     match &words.force {
         ForceCourse::Value(force) => ForceInTime::Grown(force.si() / copies),
         ForceCourse::Course(course) => {
-            let rows = course.table.iter().map(|r| (r.time.si(), r.force.si() / copies));
+            let rows = course
+                .table
+                .iter()
+                .map(|r| (r.time.si(), r.force.si() / copies));
             let (times, forces) = rows.unzip();
             ForceInTime::Course(MonotoneCubic::new(times, forces))
         }

@@ -121,7 +121,11 @@ impl MovedPart {
                 }
             }
         }
-        let rate = if dt > 0.0 { (self.way - before) / dt } else { 0.0 };
+        let rate = if dt > 0.0 {
+            (self.way - before) / dt
+        } else {
+            0.0
+        };
         let motion = RigidMotion {
             shift: scale(self.outwards, self.way),
             velocity: scale(self.outwards, rate),
@@ -170,11 +174,13 @@ impl Grip {
     /// Force on the ply (N), and how far its middle has been drawn against the pull (m).
     fn state(&self, model: &Model, t: f64, forming: f64) -> [f64; 2] {
         let force = self.force * smooth_step(t, 0.0, RISE * forming);
-        self.nodes.iter().fold([0.0; 2], |sum, (node, share, start)| {
-            let drawn = self.drawn(model.x()[*node as usize], *start);
-            let force = (share * (force + self.spring * drawn)).max(0.0);
-            [sum[0] + force, sum[1] + share * drawn]
-        })
+        self.nodes
+            .iter()
+            .fold([0.0; 2], |sum, (node, share, start)| {
+                let drawn = self.drawn(model.x()[*node as usize], *start);
+                let force = (share * (force + self.spring * drawn)).max(0.0);
+                [sum[0] + force, sum[1] + share * drawn]
+            })
     }
 }
 
@@ -210,7 +216,10 @@ impl StampingLoad {
 
     /// Where the history has each part and gripper.
     pub fn names(&self) -> impl Iterator<Item = String> {
-        let parts = self.parts.iter().map(|p| format!("parts/{}", p.name.word()));
+        let parts = self
+            .parts
+            .iter()
+            .map(|p| format!("parts/{}", p.name.word()));
         let grips = (1..=self.grips.len()).map(|k| format!("grippers/{k}"));
         parts.chain(grips)
     }
