@@ -132,3 +132,72 @@ pub fn rigid(
         error,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+
+    /// A scene whose tool is a block, with this part.
+    fn scene(part: Value) -> Scene {
+        let material = json!({"plyflow_material": 1, "name": "m", "plugin": "material-fabric", "thickness": "0.4 mm", "areal_mass": "0.4 kg/m2", "with": {}});
+        let scene = json!({
+            "plyflow_scene": 1, "name": "s",
+            "tool": {"flat": {"length": "60 mm", "width": "40 mm", "height": "10 mm", "fillet": "2 mm", "facet_size": "5 mm"}},
+            "sheets": [{"name": "a", "kind": "ply", "material": material, "length": "80 mm", "width": "60 mm", "fibre_1": "0 deg", "fibre_2": "90 deg"}],
+            "friction": {"tool_fabric": 0.2},
+            "process": {"stamping": {"forming_time": "100 ms", "settling_time": "10 ms", "parts": [part]}}
+        });
+        serde_json::from_value(scene).unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    fn made(part: Value) -> Result<PartTool, String> {
+        let scene = scene(part);
+        let plyflow_model::scene::Process::Stamping(stamping) = &scene.process else {
+            unreachable!()
+        };
+        rigid(&scene, stamping, 0, 2e-3)
+    }
+
+    fn block(height: &str) -> Value {
+        json!({"flat": {"length": "50 mm", "width": "30 mm", "height": height, "fillet": "2 mm", "facet_size": "5 mm"}})
+    }
+
+    #[test]
+    fn a_part_that_hangs_is_met_at_its_lowest_face_and_one_that_stands_at_its_highest() {
+        for (side, up, away) in [("above", "-z", -1.0), ("below", "+z", 1.0)] {
+            let part = json!({"name": "pad", "side": side, "tool": block("8 mm"), "up": up, "centre": ["10 mm", "5 mm"], "foot": "20 mm"});
+            let made = made(part).unwrap();
+            let [low, high] = made.mesh.bounds();
+            for (found, expected) in [(low, [-0.015, -0.01, 0.02]), (high, [0.035, 0.02, 0.028])] {
+                for k in 0..3 {
+                    assert!((found[k] - expected[k]).abs() < 1e-9, "{found:?}");
+                }
+            }
+            // 1 mm off the face that touches, and 1 mm in it.
+            let face = if side == "above" { 0.02 } else { 0.028 };
+            for off in [1e-3, -1e-3] {
+                let (distance, gradient) = made.field.distance_and_gradient([0.01, 0.005, face + away * off]);
+                assert!((distance - off).abs() < 1e-5, "{side}: {distance}");
+                assert!((gradient[2] - away).abs() < 1e-3, "{side}: {gradient:?}");
+            }
+            // Beside its wall, in x and y alike.
+            let (distance, gradient) = made.field.distance_and_gradient([0.01, 0.022, 0.024]);
+            assert!((distance - 2e-3).abs() < 1e-5 && gradient[1] > 0.99, "{side}: {distance} {gradient:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_part_is_told_with_its_place_in_the_scene() {
+        let told = |tool: Value| {
+            let part = json!({"name": "pad", "side": "below", "tool": tool});
+            made(part).err().expect("refused")
+        };
+        let speck = told(json!({"flat": {"length": "3 mm", "width": "3 mm", "height": "2 mm", "fillet": "0.5 mm", "facet_size": "1 mm"}}));
+        assert!(speck.starts_with("scene.process.stamping.parts[0].tool"), "{speck}");
+        let file = told(json!({"stl": {"file": "nowhere.stl", "unit": "1 mm"}}));
+        assert!(file.starts_with("scene.process.stamping.parts[0] (`pad`): tool file nowhere.stl"), "{file}");
+        let unread = told(json!({"input": {"body": "block"}}));
+        assert!(unread.contains("parts[0].tool.input.body"), "{unread}");
+    }
+}
