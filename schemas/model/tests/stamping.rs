@@ -66,7 +66,7 @@ type Change = fn(&mut Value);
 
 #[test]
 fn what_makes_no_stamping_is_refused_with_its_place_and_what_is_expected() {
-    let cases: [(Change, Rule, &str, &str); 24] = [
+    let cases: [(Change, Rule, &str, &str); 26] = [
         (
             |s| s["parts"][1]["name"] = json!("die"),
             Rule::Name,

@@ -116,26 +116,7 @@ fn surface(known: &Known<'_>, part: &StampingPart, path: &Path, found: &mut Vec<
     ];
     let count = given.iter().filter(|g| g.1).count();
     if own {
-        if let Some((key, _)) = given.iter().find(|g| g.1) {
-            let text = format!("`{key}` stands at the part `tool`, which is the scene's own tool");
-            let fault = Fault::text(Rule::Press, path.key(key), text);
-            found.push(
-                fault
-                    .shown(Shown::Key)
-                    .help("leave it out, or give the part another name if it is a further one"),
-            );
-        }
-        if !part.place().only_moves() || part.translate.iter().any(|t| t.si() != 0.0) {
-            let text = "the scene's own tool has its place from the words beside its surface";
-            let fault = Fault::text(Rule::Press, path.key("name"), text);
-            found.push(
-                fault.help("leave out `translate`, `up`, `rotate`, `centre` and `foot` here"),
-            );
-        }
-        if part.side == Side::Above {
-            let fault = Fault::given(Rule::Press, path.key("side"), "above");
-            found.push(fault.expected("`below`: the sheets of a scene stand over its tool"));
-        }
+        own_tool(part, given, path, found);
     } else if count != 1 {
         let text = match count {
             0 => format!("the part `{}` has no surface", part.name),
@@ -159,6 +140,49 @@ fn surface(known: &Known<'_>, part: &StampingPart, path: &Path, found: &mut Vec<
     }
     if let Some(die) = &part.matching {
         found.extend(matching(known, part, die, &path.key("matching")));
+    }
+}
+
+/// The scene's own tool has its surface and place from the scene, is below the plies, and ends where it is drawn: there all that measures distances
+/// to it takes it.
+fn own_tool(part: &StampingPart, given: [(&str, bool); 2], path: &Path, found: &mut Vec<Fault>) {
+    if let Some((key, _)) = given.iter().find(|g| g.1) {
+        let text = format!("`{key}` stands at the part `tool`, which is the scene's own tool");
+        let fault = Fault::text(Rule::Press, path.key(key), text);
+        found.push(
+            fault
+                .shown(Shown::Key)
+                .help("leave it out, or give the part another name if it is a further one"),
+        );
+    }
+    if !part.place().only_moves() || part.translate.iter().any(|t| t.si() != 0.0) {
+        let text = "the scene's own tool has its place from the words beside its surface";
+        let fault = Fault::text(Rule::Press, path.key("name"), text);
+        found.push(fault.help("leave out `translate`, `up`, `rotate`, `centre` and `foot` here"));
+    }
+    if part.side == Side::Above {
+        let fault = Fault::given(Rule::Press, path.key("side"), "above");
+        found.push(fault.expected("`below`: the sheets of a scene stand over its tool"));
+    }
+    match &part.motion {
+        Some(PartMotion::Pressed(_)) => {
+            let text = "the scene's own tool is pressed, so that nobody knows where it ends";
+            let fault = Fault::text(Rule::Press, path.key("motion").key("pressed"), text);
+            found.push(fault.shown(Shown::Key).expected("`table: [..]`, or no motion").help(
+                "what measures distances takes the tool where it is drawn: press the parts on the other side instead",
+            ));
+        }
+        Some(PartMotion::Table(rows)) => {
+            if let Some((k, way)) = rows.iter().map(|r| r.way.si()).enumerate().last()
+                && way.abs() > SAME
+            {
+                let path = path.key("motion").key("table").item(k).key("way");
+                found.push(Fault::given(Rule::Press, path, mm(way)).expected(
+                    "`0 mm` in the last row: what measures distances takes the tool where it is drawn",
+                ));
+            }
+        }
+        None => {}
     }
 }
 
