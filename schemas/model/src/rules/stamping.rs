@@ -2,7 +2,6 @@
 
 use crate::fault::{Fault, Part, Path, Rule, Shown, mm};
 use crate::material::MaterialEntry;
-use crate::outline::{Point, winds};
 use crate::rules::friction::row_count;
 use crate::rules::known::Known;
 use crate::rules::sheets::RIGID;
@@ -402,15 +401,8 @@ fn grips(known: &Known<'_>, gripper: &Gripper, path: &Path, found: &mut Vec<Faul
     };
     let [x, y] = gripper.centre.map(|c| c.si());
     let [a, b] = [0.5 * gripper.length.si(), 0.5 * gripper.width.si()];
-    let corners: [Point; 5] = [
-        [x, y],
-        [x - a, y - b],
-        [x + a, y - b],
-        [x + a, y + b],
-        [x - a, y + b],
-    ];
-    let on = |p: &Point| winds(&region.outline, *p);
-    if !corners.iter().any(on) {
+    let [x0, y0, x1, y1] = region.bounds();
+    if x + a < x0 || x - a > x1 || y + b < y0 || y - b > y1 {
         let text = format!("the gripper holds no place of `{}`", ply.name);
         let fault = Fault::text(Rule::Press, path.key("centre"), text);
         found.push(fault.help("`centre` is a place over the tool, as the plies lie at the start; move it onto the ply"));

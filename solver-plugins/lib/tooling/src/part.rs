@@ -177,13 +177,18 @@ mod tests {
             // 1 mm off the face that touches, and 1 mm in it.
             let face = if side == "above" { 0.02 } else { 0.028 };
             for off in [1e-3, -1e-3] {
-                let (distance, gradient) = made.field.distance_and_gradient([0.01, 0.005, face + away * off]);
+                let (distance, gradient) =
+                    made.field
+                        .distance_and_gradient([0.01, 0.005, face + away * off]);
                 assert!((distance - off).abs() < 1e-5, "{side}: {distance}");
                 assert!((gradient[2] - away).abs() < 1e-3, "{side}: {gradient:?}");
             }
             // Beside its wall, in x and y alike.
             let (distance, gradient) = made.field.distance_and_gradient([0.01, 0.022, 0.024]);
-            assert!((distance - 2e-3).abs() < 1e-5 && gradient[1] > 0.99, "{side}: {distance} {gradient:?}");
+            assert!(
+                (distance - 2e-3).abs() < 1e-5 && gradient[1] > 0.99,
+                "{side}: {distance} {gradient:?}"
+            );
         }
     }
 
@@ -193,10 +198,18 @@ mod tests {
             let part = json!({"name": "pad", "side": "below", "tool": tool});
             made(part).err().expect("refused")
         };
-        let speck = told(json!({"flat": {"length": "3 mm", "width": "3 mm", "height": "2 mm", "fillet": "0.5 mm", "facet_size": "1 mm"}}));
-        assert!(speck.starts_with("scene.process.stamping.parts[0].tool"), "{speck}");
+        let speck = told(
+            json!({"flat": {"length": "3 mm", "width": "3 mm", "height": "2 mm", "fillet": "0.5 mm", "facet_size": "1 mm"}}),
+        );
+        assert!(
+            speck.starts_with("scene.process.stamping.parts[0].tool"),
+            "{speck}"
+        );
         let file = told(json!({"stl": {"file": "nowhere.stl", "unit": "1 mm"}}));
-        assert!(file.starts_with("scene.process.stamping.parts[0] (`pad`): tool file nowhere.stl"), "{file}");
+        assert!(
+            file.starts_with("scene.process.stamping.parts[0] (`pad`): tool file nowhere.stl"),
+            "{file}"
+        );
         let unread = told(json!({"input": {"body": "block"}}));
         assert!(unread.contains("parts[0].tool.input.body"), "{unread}");
     }

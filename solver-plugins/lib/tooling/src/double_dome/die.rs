@@ -53,7 +53,7 @@ impl Shape {
         if x.abs() <= self.waist * self.turn.fixed_sin() {
             [-x / self.waist, (self.height - r) / self.waist]
         } else {
-            let along = (x.abs() - self.centre).copysign(x);
+            let along = (x.abs() - self.centre) * x.signum();
             [along / self.radius, r / self.radius]
         }
     }
@@ -278,6 +278,15 @@ mod tests {
             .collect();
         assert!(all.len() > 500);
         let off = all.iter().map(|d| (d - 1.5e-3).abs()).fold(0.0, f64::max);
+        assert!(off < 2.0 * CHORD_TOLERANCE, "{off}");
+        // The rim of the face, all around: as far from the dome as gap and rounding.
+        let on_rim =
+            |p: &&[f64; 3]| (p[2] - 0.012).abs() < 1e-9 && p[0].abs() < 0.2 && p[1].abs() < 0.12;
+        let rim: Vec<f64> = (die.points.iter().filter(on_rim))
+            .map(|p| punch.closest(*p).signed_distance)
+            .collect();
+        assert!(rim.len() > 50);
+        let off = rim.iter().map(|d| (d - 11.5e-3).abs()).fold(0.0, f64::max);
         assert!(off < 2.0 * CHORD_TOLERANCE, "{off}");
         // The block's box: as long and wide as said, from the face to the crown over the hollow.
         let [low, high] = die.bounds();
