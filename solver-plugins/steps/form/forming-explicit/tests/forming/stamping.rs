@@ -301,7 +301,7 @@ fn what_cannot_be_stamped_is_refused_with_the_parts_the_place_and_the_time() {
         ),
         (
             vec![with(block("holder", 0.03), table(0.0, 0.002))],
-            vec!["`tool` and `holder` meet", "t = 0.0 ms"],
+            vec!["`tool` and `holder` meet", "in each other at ("],
         ),
         (
             vec![with(pad("pad", 0.0, 0.0083), table(0.0, 0.001))],
