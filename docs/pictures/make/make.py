@@ -6,7 +6,6 @@ import time
 import browser
 import coupons
 import diagrams
-import dome
 import drawings
 import law
 import others
@@ -18,7 +17,7 @@ PICTURES = {
     "spar-zones": spar.spar_zones, "tool-spar": spar.tool_spar, "forming-stages": spar.forming_stages, "shear-angle": spar.shear_angle,
     "local-wrinkle": spar.local_wrinkle, "cross-section": spar.cross_section, "energy-ledger": spar.energy_ledger,
     "kinematic": spar.kinematic, "bias-extension": coupons.bias_extension, "cantilever": coupons.cantilever, "buckling": coupons.buckling,
-    "hemisphere": coupons.hemisphere, "double-dome": dome.double_dome, "speed-error": diagrams.speed_error, "bag-layers": diagrams.bag_layers,
+    "hemisphere": coupons.hemisphere, "speed-error": diagrams.speed_error, "bag-layers": diagrams.bag_layers,
     "workflow-graph": diagrams.workflow_graph, "floors": diagrams.floors, "law-in-python": law.law_in_python,
     "files-of-others": others.files_of_others, "export": drawings.export, "study": browser.study, "report": browser.report,
     "report-answer": browser.report_answer, "report-limits": browser.report_limits,
