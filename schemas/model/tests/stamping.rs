@@ -194,14 +194,17 @@ fn what_makes_no_stamping_is_refused_with_its_place_and_what_is_expected() {
             "more than 0 N",
         ),
         (
-            |s| s["parts"][1] = json!({"name": "tool", "side": "below", "motion": {"pressed": {"force": "5 N"}}}),
+            |s| {
+                s["parts"][1] = json!({"name": "tool", "side": "below", "motion": {"pressed": {"force": "5 N"}}})
+            },
             Rule::Press,
             "parts[1].motion.pressed: the scene's own tool is pressed",
             "`table: [..]`",
         ),
         (
             |s| {
-                let rows = json!([{"time": "0 ms", "way": "9 mm"}, {"time": "50 ms", "way": "2 mm"}]);
+                let rows =
+                    json!([{"time": "0 ms", "way": "9 mm"}, {"time": "50 ms", "way": "2 mm"}]);
                 s["parts"][1] = json!({"name": "tool", "side": "below", "motion": {"table": rows}});
             },
             Rule::Press,
