@@ -312,7 +312,7 @@ fn what_cannot_be_stamped_is_refused_with_the_parts_the_place_and_the_time() {
         ),
         (
             vec![with(pad("pad", 0.2, 0.0103), table(0.01, 0.0))],
-            vec!["`pad` is never over a ply", "(182.0, -30.0, 10.3) mm"],
+            vec!["`pad` is never over a ply", "(182.0, -30.0, 20.3) mm"],
         ),
         (
             vec![with(pad("pad", 0.0, 0.0203), table(0.0, 0.01))],
