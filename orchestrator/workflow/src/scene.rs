@@ -177,7 +177,7 @@ pub fn scene_value(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> 
     };
     let node = filled.as_ref().map_or(node, |f| &f.scene);
     let found = resolver.problems.places_from(before);
-    let tool = stl_file(resolver, node, at);
+    let files = stl_files(resolver, node, at);
     let materials = materials(resolver, node, at);
     // Rules look at all sheets: without those of a book that could not be read they would find what is none.
     if filled.as_ref().is_none_or(|f| f.sound) {
@@ -187,8 +187,10 @@ pub fn scene_value(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> 
         return None;
     }
     let mut scene = node.to_json();
-    if let Some(path) = tool {
-        scene["tool"]["stl"]["file"] = json!(path);
+    for (pointer, path) in files {
+        if let Some(file) = scene.pointer_mut(&format!("/{pointer}")) {
+            *file = json!(path);
+        }
     }
     for (i, material) in materials.into_iter().enumerate() {
         scene["sheets"][i]["material"] = material?;
@@ -213,12 +215,40 @@ pub fn scene_value(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> 
     }
 }
 
-fn stl_file(resolver: &mut Resolver<'_>, scene: &Node, at: &Place<'_>) -> Option<Utf8PathBuf> {
-    let entry = scene.get("tool")?.get("stl")?.entry("file")?;
+/// The files of the scene's tool and of the rigid parts of a stamping, each with its pointer in the scene.
+fn stl_files(
+    resolver: &mut Resolver<'_>,
+    scene: &Node,
+    at: &Place<'_>,
+) -> Vec<(String, Utf8PathBuf)> {
+    let own = scene.get("tool").map(|tool| ("tool".to_owned(), tool));
+    let stamping = scene.get("process").and_then(|p| p.get("stamping"));
+    let parts = stamping.and_then(|s| s.get("parts"));
+    let parts = parts.map_or(&[][..], Node::items).iter().enumerate();
+    let parts = parts.filter_map(|(k, part)| {
+        let pointer = format!("process/stamping/parts/{k}/tool");
+        Some((pointer, part.get("tool")?))
+    });
+    let tools: Vec<(String, &Node)> = own.into_iter().chain(parts).collect();
+    let files = tools.into_iter().filter_map(|(pointer, tool)| {
+        let pointer = format!("{pointer}/stl/file");
+        let path = stl_file(resolver, tool, &pointer, at)?;
+        Some((pointer, path))
+    });
+    files.collect()
+}
+
+fn stl_file(
+    resolver: &mut Resolver<'_>,
+    tool: &Node,
+    pointer: &str,
+    at: &Place<'_>,
+) -> Option<Utf8PathBuf> {
+    let entry = tool.get("stl")?.entry("file")?;
     let text = entry.value.text()?;
-    let place = at.below("tool/stl/file", "file".into(), &entry.key_span);
+    let place = at.below(pointer, "file".into(), &entry.key_span);
     let place = Place {
-        pointer: format!("{}/tool/stl/file", at.pointer),
+        pointer: format!("{}/{pointer}", at.pointer),
         ..place
     };
     resolver.file(text, &entry.value, &place)

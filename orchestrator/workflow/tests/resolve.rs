@@ -283,6 +283,36 @@ fn files_of_a_scene_are_absolute_and_hashed() {
 }
 
 #[test]
+fn files_of_the_parts_of_a_stamping_are_absolute_and_hashed() {
+    let study = Study::sound();
+    study.write("die.stl", "solid\nendsolid\n");
+    let scene = study.read("scene.yaml");
+    let at = |word: &str| scene.find(word).unwrap();
+    let ply = &scene[at("  - name: ply-1")..at("  - name: upper-film")];
+    let stamping = "process:\n  stamping:\n    forming_time: 20 ms\n    settling_time: 5 ms\n    parts:\n      - name: die\n        side: above\n        \
+                    tool: {stl: {file: ./materials/../die.stl, unit: 1 mm}}\n        motion: {table: [{time: 0 ms, way: 9 mm}, {time: 20 ms, way: 0 mm}]}\n";
+    let head = &scene[..at("sheets:")];
+    let friction = "friction: {tool_fabric: 0.2}\n";
+    study.write(
+        "scene.yaml",
+        &format!("{head}sheets:\n{ply}{friction}{stamping}"),
+    );
+    let w = study
+        .load()
+        .unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let coarse = step(&w, "coarse");
+    let pointer = "/scene/process/stamping/parts/0/tool/stl/file";
+    assert_eq!(coarse.files.len(), 1);
+    assert_eq!(coarse.files[0].pointer, pointer);
+    assert_eq!(coarse.files[0].path, study.path("die.stl"));
+    let parameters = json!(coarse.parameters);
+    assert_eq!(
+        parameters.pointer(pointer),
+        Some(&json!(study.path("die.stl")))
+    );
+}
+
+#[test]
 fn a_scene_and_its_materials_may_stand_in_the_workflow() {
     let study = Study::sound();
     let indent = |text: &str, by: usize| -> String {

@@ -6,6 +6,7 @@
 use crate::contour::Contour;
 use crate::fault::Path;
 use crate::outline::{Point, Region};
+use crate::process::Process;
 use crate::scene::{Scene, Sheet};
 use crate::tool::{GivenSurface, Tool};
 use std::fmt;
@@ -58,9 +59,19 @@ impl fmt::Display for AskedFor {
 /// All that a scene asks other steps for, with the place of the name, in the order of the scene.
 pub fn asks(scene: &Scene) -> Vec<(Path, AskedFor)> {
     let mut found = Vec::new();
-    if let Tool::Input(input) = &scene.tool {
-        let path = Path::to("tool").key("input").key("body");
-        found.push((path, AskedFor::Body(input.body.clone())));
+    let mut body = |tool: &Tool, path: Path| {
+        if let Tool::Input(input) = tool {
+            let path = path.key("input").key("body");
+            found.push((path, AskedFor::Body(input.body.clone())));
+        }
+    };
+    body(&scene.tool, Path::to("tool"));
+    if let Process::Stamping(stamping) = &scene.process {
+        for (k, part) in stamping.parts.iter().enumerate() {
+            if let Some(tool) = &part.tool {
+                body(tool, part_at(k).key("tool"));
+            }
+        }
     }
     for (k, sheet) in scene.sheets.iter().enumerate() {
         let at = Path::to("sheets").item(k);
@@ -81,19 +92,36 @@ pub fn asks(scene: &Scene) -> Vec<(Path, AskedFor)> {
     found
 }
 
+/// Place of a rigid part of a stamping.
+fn part_at(k: usize) -> Path {
+    Path::to("process").key("stamping").key("parts").item(k)
+}
+
 /// Puts what other steps give into a scene, in the place of every word that asks for it. The holes of a ply's outline follow those that the scene
 /// lists.
 ///
 /// # Errors
 /// What is missing or bounds no region, with its place in the scene and the step that gave it.
 pub fn fill(scene: &mut Scene, from: &dyn Geometry) -> Result<(), String> {
-    if let Tool::Input(input) = &mut scene.tool {
-        let given = from.body(&input.body);
-        let given = given.map_err(|why| format!("scene.tool.input.body: {why}"))?;
-        input.given = Some(Arc::new(given));
+    fill_tool(&mut scene.tool, &Path::to("tool"), from)?;
+    if let Process::Stamping(stamping) = &mut scene.process {
+        for (k, part) in stamping.parts.iter_mut().enumerate() {
+            if let Some(tool) = &mut part.tool {
+                fill_tool(tool, &part_at(k).key("tool"), from)?;
+            }
+        }
     }
     for (k, sheet) in scene.sheets.iter_mut().enumerate() {
         fill_sheet(sheet, &Path::to("sheets").item(k), from)?;
+    }
+    Ok(())
+}
+
+fn fill_tool(tool: &mut Tool, at: &Path, from: &dyn Geometry) -> Result<(), String> {
+    if let Tool::Input(input) = tool {
+        let given = from.body(&input.body);
+        let given = given.map_err(|why| format!("scene.{at}.input.body: {why}"))?;
+        input.given = Some(Arc::new(given));
     }
     Ok(())
 }

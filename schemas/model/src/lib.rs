@@ -23,6 +23,7 @@ pub mod regions;
 pub mod rules;
 pub mod scene;
 pub mod schema;
+pub mod stamping;
 pub mod text;
 pub mod tool;
 pub mod units;

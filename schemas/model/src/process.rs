@@ -1,5 +1,6 @@
-//! The forming process of a scene: double-diaphragm forming or a press.
+//! The forming process of a scene: double-diaphragm forming, a press, or stamping between any rigid parts.
 
+use crate::stamping::Stamping;
 use crate::units::{Force, Length, Number, Pressure, Time};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -12,6 +13,8 @@ pub enum Process {
     DoubleDiaphragm(DoubleDiaphragm),
     /// Press forming: punch, die and blank holder.
     Press(Press),
+    /// Stamping between any rigid parts.
+    Stamping(Stamping),
 }
 
 impl Process {
@@ -19,7 +22,7 @@ impl Process {
     pub fn clearance(&self) -> f64 {
         match self {
             Self::DoubleDiaphragm(p) => p.clearance.si(),
-            Self::Press(_) => 0.0,
+            Self::Press(_) | Self::Stamping(_) => 0.0,
         }
     }
 
@@ -28,6 +31,7 @@ impl Process {
         match self {
             Self::DoubleDiaphragm(_) => "double_diaphragm",
             Self::Press(_) => "press",
+            Self::Stamping(_) => "stamping",
         }
     }
 }

@@ -7,6 +7,7 @@ pub mod known;
 pub mod process;
 pub mod regions;
 pub mod sheets;
+pub mod stamping;
 pub mod surfaces;
 pub mod symmetry;
 

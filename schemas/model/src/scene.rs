@@ -19,6 +19,9 @@ pub use crate::process::{
     DoubleDiaphragm, Hold, Holder, Press, PressPlate, PressureAt, PressureCourse, PressureTable,
     Process, Towards, WeightDirection,
 };
+pub use crate::stamping::{
+    ForceCourse, Gripper, MatchingDie, PartMotion, Pressed, Side, Stamping, StampingPart, Vertical,
+};
 pub use crate::tool::{
     DoubleDomeTool, FlatTool, GivenSurface, HemisphereTool, InputTool, Joggle, JoggleSpar,
     RampedSpar, StlTool, TetrahedronTool, Tool,

@@ -279,7 +279,7 @@ fn pairs(
     found: &mut Vec<Fault>,
 ) {
     let sheets = sheets.iter().map(|s| s.name.as_str());
-    let names: Vec<&str> = rigid_parts(process).iter().copied().chain(sheets).collect();
+    let names: Vec<&str> = rigid_parts(process).into_iter().chain(sheets).collect();
     let at = Path::to("friction").key("pairs");
     for (k, pair) in friction.pairs.iter().enumerate() {
         let path = at.item(k).key("between");

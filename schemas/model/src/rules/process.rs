@@ -5,6 +5,7 @@ use crate::material::MaterialEntry;
 use crate::process::{DoubleDiaphragm, Hold, Press, PressureCourse, Process};
 use crate::rules::friction::row_count;
 use crate::rules::known::Known;
+use crate::rules::stamping;
 use crate::scene::{Sheet, SheetKind};
 use crate::units::{Length, si_number};
 use plyflow_fixed::FixedBits;
@@ -17,7 +18,7 @@ pub fn stack(known: &Known<'_>) -> Option<Fault> {
         .map(|s| s.kind == SheetKind::Diaphragm)
         .collect();
     let (at, expected, help) = match process {
-        Process::Press(_) => (
+        Process::Press(_) | Process::Stamping(_) => (
             films.iter().position(|f| *f)?,
             "plies alone".to_owned(),
             "a press has no films: leave the diaphragms out, or form the stack by `double_diaphragm`",
@@ -92,6 +93,7 @@ pub fn check(known: &Known<'_>) -> Vec<Fault> {
             found.extend(gap(known, press));
             found.extend(reach_of_die(known, press));
         }
+        Some(Process::Stamping(stamping)) => stamping::check(known, stamping, &mut found),
         None => {}
     }
     found

@@ -7,6 +7,7 @@ use crate::outline::{Millimetres, Point, cross, mirrored, segment_distance, side
 use crate::process::Process;
 use crate::regions::{ALL, CLASSES, PlyRegion, RegionError, SAME_PLACE, Stitches, edge_distance};
 use crate::rules::known::Known;
+use crate::rules::surfaces::rigid_parts;
 use crate::scene::{Sheet, SheetKind};
 
 /// Inside, and not on a side.
@@ -81,9 +82,12 @@ fn partners(known: &Known<'_>) -> Vec<(String, &'static str)> {
         (s.name.clone(), class)
     };
     let mut all: Vec<(String, &'static str)> = known.sheets.iter().flatten().map(sheet).collect();
-    if let Some(Process::Press(press)) = known.process {
-        let holder = press.holder.as_ref().map(|_| "holder");
-        let rigid = ["tool", "die"].into_iter().chain(holder);
+    // In a bag no ply touches what is rigid.
+    let rigid = known
+        .process
+        .filter(|p| !matches!(p, Process::DoubleDiaphragm(_)));
+    if let Some(process) = rigid {
+        let rigid = rigid_parts(process).into_iter();
         all.extend(rigid.map(|n| (n.to_owned(), CLASSES[2])));
     }
     all

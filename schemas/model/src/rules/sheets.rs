@@ -2,6 +2,7 @@
 
 use crate::fault::{Fault, Path, Rule, Shown};
 use crate::outline::{ContourName, OutlineError, Region};
+use crate::process::Process;
 use crate::rules::known::Known;
 use crate::scene::{Sheet, SheetKind};
 use crate::text::is_word;
@@ -18,6 +19,9 @@ pub const LEAST_CROSSING: f64 = 6.0;
 pub fn check(known: &Known<'_>) -> Vec<Fault> {
     let mut found = Vec::new();
     let mut names = RIGID.to_vec();
+    if let Some(Process::Stamping(stamping)) = known.process {
+        names.extend(stamping.parts.iter().map(|part| part.name.as_str()));
+    }
     for (k, sheet) in known.numbered() {
         let at = Path::to("sheets").item(k);
         found.extend(name(sheet, &names, at.key("name")));
@@ -38,7 +42,7 @@ fn name(sheet: &Sheet, taken: &[&str], path: Path) -> Option<Fault> {
     if taken.contains(&name.as_str()) {
         return Some(
             Fault::text(Rule::Name, path, format!("the name `{name}` is taken")).expected(
-                "a name of its own for every sheet, other than `tool`, `bed`, `die` and `holder`",
+                "a name of its own for every sheet, other than `tool`, `bed`, `die` and `holder` and those of rigid parts",
             ),
         );
     }

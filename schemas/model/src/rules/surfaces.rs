@@ -2,6 +2,7 @@
 
 use crate::process::Process;
 use crate::scene::{Sheet, SheetKind};
+use crate::stamping::Side;
 
 /// A class of two surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,20 +77,30 @@ pub fn same_pair(a: [&str; 2], b: [&str; 2]) -> bool {
 }
 
 /// The rigid parts of a process, by the names that friction has for them.
-pub fn rigid_parts(process: &Process) -> &'static [&'static str] {
+pub fn rigid_parts(process: &Process) -> Vec<&str> {
+    sides(process).into_iter().map(|(name, _)| name).collect()
+}
+
+/// The rigid parts of a process with the side of the sheets on which they are.
+pub fn sides(process: &Process) -> Vec<(&str, Side)> {
+    let (below, above) = (Side::Below, Side::Above);
     match process {
-        Process::DoubleDiaphragm(_) => &["tool", "bed"],
-        Process::Press(press) if press.holder.is_some() => &["tool", "die", "holder"],
-        Process::Press(_) => &["tool", "die"],
+        Process::DoubleDiaphragm(_) => vec![("tool", below), ("bed", below)],
+        Process::Press(press) => {
+            let holder = press.holder.as_ref().map(|_| ("holder", below));
+            let parts = [("tool", below), ("die", above)];
+            parts.into_iter().chain(holder).collect()
+        }
+        Process::Stamping(stamping) => stamping.sides(),
     }
 }
 
 /// All contacts of a stack, from the tool upwards.
-pub fn contacts<'a>(sheets: &[&'a Sheet], process: &Process) -> Vec<Contact<'a>> {
+pub fn contacts<'a>(sheets: &[&'a Sheet], process: &'a Process) -> Vec<Contact<'a>> {
     let last = sheets.len().saturating_sub(1);
     let bag = matches!(process, Process::DoubleDiaphragm(_));
     let mut found = Vec::new();
-    for part in rigid_parts(process) {
+    for (part, side) in sides(process) {
         // In a press any ply may touch any part, past the edges of the others.
         for (k, sheet) in sheets
             .iter()
@@ -97,8 +108,7 @@ pub fn contacts<'a>(sheets: &[&'a Sheet], process: &Process) -> Vec<Contact<'a>>
             .take(if bag { 1 } else { last + 1 })
         {
             let name = sheet.name.as_str();
-            // The die is the plate over the plies.
-            let over = *part == "die";
+            let over = side == Side::Above;
             found.push(Contact {
                 parts: if over { [name, part] } else { [part, name] },
                 class: if bag {

@@ -36,6 +36,12 @@ pub trait Loaded {
 
     /// Moves the rigid surface of a contact.
     fn set_rigid_motion(&mut self, contact: usize, motion: RigidMotion);
+
+    /// Position (m) of a node.
+    fn position(&self, node: u32) -> Vec3;
+
+    /// Sets the nodal load (N, global axes) of a node, in the place of what it was.
+    fn set_load(&mut self, node: u32, force: Vec3);
 }
 
 /// What acts on a model from outside.
@@ -129,6 +135,14 @@ impl Loaded for Model {
 
     fn set_rigid_motion(&mut self, contact: usize, motion: RigidMotion) {
         self.rigid_contacts_mut()[contact].motion = motion;
+    }
+
+    fn position(&self, node: u32) -> Vec3 {
+        self.x()[node as usize]
+    }
+
+    fn set_load(&mut self, node: u32, force: Vec3) {
+        Model::set_load(self, node, force);
     }
 }
 

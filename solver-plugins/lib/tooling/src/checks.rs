@@ -120,7 +120,7 @@ pub(crate) fn speck(size: Vec3, spacing: f64) -> bool {
 }
 
 /// Whether a tool is more than a speck: a wrong `unit` would leave a run without any.
-fn check_unit(scene: &Scene, mesh: &ToolMesh, spacing: f64) -> Result<(), String> {
+pub(crate) fn check_unit(scene: &Scene, mesh: &ToolMesh, spacing: f64) -> Result<(), String> {
     let size = size(mesh);
     if !speck(size, spacing) {
         return Ok(());
@@ -296,7 +296,7 @@ fn check_bodies(scene: &Scene, mesh: &ToolMesh, shells: &[ToolMesh]) -> Result<(
 }
 
 /// Whether a tool has walls that would not hold a ply: in them nothing tells on which side a sheet is once it is as deep as they are thick.
-fn check_walls(scene: &Scene, mesh: &ToolMesh) -> Result<(), String> {
+pub(crate) fn check_walls(scene: &Scene, mesh: &ToolMesh) -> Result<(), String> {
     let ply = thinnest_ply(scene);
     if !ply.is_finite() {
         return Ok(());

@@ -1,5 +1,9 @@
 //! Two domes joined by a waist, on a vertical wall.
 
+mod die;
+
+pub(crate) use die::die;
+
 use crate::chord::CHORD_TOLERANCE;
 use crate::mesh::ToolMesh;
 use crate::sweep::arc_step;

@@ -80,26 +80,13 @@ pub fn placement_told(placement: &ToolPlacement) -> String {
 /// that would do.
 pub fn rigid(scene: &Scene, spacing: f64) -> Result<RigidTool, String> {
     let Built { mesh, placement } = checked(scene, spacing)?;
-    check_size(scene, &mesh, spacing)?;
     let ply = thinnest_ply(scene);
     let tolerance = SHARE * ply;
     let touched = touched(scene, &mesh);
-    let build = |spacing: f64| {
-        let stack = stack(scene);
-        let space = [spacing, reach(spacing, stack)];
-        SignedDistanceGrid::build_within(&mesh, space, [tolerance, stack], &touched)
-    };
-    let (field, error) = build(spacing);
-    if error.largest > tolerance {
-        let would_do = spacing_that_does(&mesh, stack(scene), spacing, |s| {
-            let (field, error) = build(s);
-            (error.largest <= tolerance).then(|| field.memory())
-        });
-        return Err(off(spacing, error, ply, would_do));
-    }
-    // Between diaphragms there is no elsewhere.
+    let (field, error) = field_of(scene, &mesh, spacing, &touched, |at| at)?;
+    // Elsewhere is only what of a press's punch does not go through the blank.
     let elsewhere = match scene.process {
-        Process::DoubleDiaphragm(_) => FieldError::default(),
+        Process::DoubleDiaphragm(_) | Process::Stamping(_) => FieldError::default(),
         Process::Press(_) => field.error_against(&mesh, 0.0, |p| !touched(p)),
     };
     let mut warnings = Vec::new();
@@ -124,6 +111,39 @@ pub fn rigid(scene: &Scene, spacing: f64) -> Result<RigidTool, String> {
     })
 }
 
+/// The distance field of triangles with points `spacing` (m) apart, and its error where `counts` is true. `in_scene`: from where the triangles
+/// are to where the scene has them, for who is told of a place.
+///
+/// # Errors
+/// When it would be too large, or is off by more than a tenth of the thinnest ply, with the spacing that would do.
+pub(crate) fn field_of(
+    scene: &Scene,
+    mesh: &ToolMesh,
+    spacing: f64,
+    counts: &(dyn Fn(Vec3) -> bool + Sync),
+    in_scene: impl Fn(Vec3) -> Vec3,
+) -> Result<(SignedDistanceGrid, FieldError), String> {
+    check_size(scene, mesh, spacing)?;
+    let ply = thinnest_ply(scene);
+    let tolerance = SHARE * ply;
+    let build = |spacing: f64| {
+        let stack = stack(scene);
+        let space = [spacing, reach(spacing, stack)];
+        SignedDistanceGrid::build_within(mesh, space, [tolerance, stack], counts)
+    };
+    let (field, mut error) = build(spacing);
+    if error.largest > tolerance {
+        let would_do = spacing_that_does(mesh, stack(scene), spacing, |s| {
+            let (field, error) = build(s);
+            (error.largest <= tolerance).then(|| field.memory())
+        });
+        error.at = in_scene(error.at);
+        return Err(off(spacing, error, ply, would_do));
+    }
+    error.at = in_scene(error.at);
+    Ok((field, error))
+}
+
 /// Thickness of all sheets (m).
 fn stack(scene: &Scene) -> f64 {
     scene.sheets.iter().map(thickness).sum()
@@ -138,7 +158,7 @@ fn reach(spacing: f64, stack: f64) -> f64 {
 /// through the blank.
 fn touched(scene: &Scene, mesh: &ToolMesh) -> impl Fn(Vec3) -> bool + Sync + use<> {
     let from = match &scene.process {
-        Process::DoubleDiaphragm(_) => f64::NEG_INFINITY,
+        Process::DoubleDiaphragm(_) | Process::Stamping(_) => f64::NEG_INFINITY,
         Process::Press(press) => mesh.bounds()[1][2] - press.stroke.si() - stack(scene),
     };
     move |p: Vec3| p[2] >= from

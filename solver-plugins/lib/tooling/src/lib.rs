@@ -21,6 +21,7 @@ mod input;
 mod mesh;
 #[cfg(feature = "steps")]
 pub mod of_step;
+pub mod part;
 pub mod sdf;
 mod stl;
 mod surface;
@@ -35,5 +36,6 @@ pub use chord::CHORD_TOLERANCE;
 pub use error::ToolError;
 pub use given::RigidTool;
 pub use mesh::ToolMesh;
+pub use part::{PartField, PartTool};
 pub use sdf::SignedDistanceGrid;
 pub use tree::{ClosestPoint, SurfaceTree};

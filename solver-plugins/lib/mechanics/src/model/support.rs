@@ -34,6 +34,15 @@ impl Model {
         };
     }
 
+    /// Sets the force (N, global axes) of the nodal load of one node, in the place of what it was; [`Model::set_load_factor`] multiplies it.
+    pub fn set_load(&mut self, node: u32, force: Vec3) {
+        let loads = &mut self.boundary.loads.force;
+        if loads.is_empty() {
+            loads.resize(self.state.x.len(), [0.0; 3]);
+        }
+        loads[node as usize] = force;
+    }
+
     /// Mass-proportional damping (1/s).
     pub fn damping(&self) -> f64 {
         self.topology.settings.damping

@@ -110,7 +110,7 @@ impl Forming {
     }
 
     /// Where the part of that name has moved (m).
-    pub fn shift(&self, part: RigidName) -> Vec3 {
+    pub fn shift(&self, part: &RigidName) -> Vec3 {
         let of = |c: &&RigidContact| part.is_of(&c.name);
         let found = self.model.rigid_contacts().iter().find(of);
         found.map_or([0.0; 3], |c| c.motion.shift)
@@ -126,8 +126,8 @@ impl Forming {
     }
 
     /// By how much (m) what contacts see of a rigid part differs at most from its triangles; none of a part that is a plane.
-    pub fn field_error(&self, part: RigidName) -> f64 {
-        let of = self.field_errors.iter().find(|(name, _)| *name == part);
+    pub fn field_error(&self, part: &RigidName) -> f64 {
+        let of = self.field_errors.iter().find(|(name, _)| name == part);
         of.map_or(0.0, |(_, e)| e.largest)
     }
 }

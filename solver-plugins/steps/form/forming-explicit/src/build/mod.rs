@@ -1,12 +1,15 @@
 //! Makes a run of a scene.
 
+pub mod apart;
 pub mod bag;
 pub mod bag_contacts;
+pub mod drawn;
 pub mod feedback;
 pub mod films;
 pub mod layout;
 pub mod plates;
 pub mod press;
+pub mod stamping;
 pub mod zone;
 
 pub use feedback::feed_back;
@@ -19,6 +22,7 @@ use crate::stack::Components;
 use bag::build_bag;
 use plyflow_model::scene::Process;
 use press::build_press;
+use stamping::build_stamping;
 
 /// Builds the model of a whole scene.
 ///
@@ -28,5 +32,6 @@ pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Formi
     match &p.scene.process {
         Process::DoubleDiaphragm(process) => build_bag(p, process, components),
         Process::Press(press) => build_press(p, press, components),
+        Process::Stamping(stamping) => build_stamping(p, stamping, components),
     }
 }

@@ -9,16 +9,16 @@ use crate::forming::Forming;
 use crate::load::{HeldByForce, Load, PressLoad, Stroke};
 use crate::request::Parameters;
 use crate::stack::{
-    Components, Elements, Parts, Placed, RigidBody, RigidName, RigidPart, StackContacts,
-    StackPlace, StackSheet, ToolSurface, layers, sheet, symmetry, tool,
+    Components, Elements, Parts, Placed, PlateMesh, RigidBody, RigidName, RigidPart, RigidShape,
+    StackContacts, StackPlace, StackSheet, ToolSurface, layers, sheet, symmetry, tool,
 };
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::Vec3;
-use plyflow_mechanics::contact::RigidSurface;
+use plyflow_mechanics::contact::{OpenPlate, RigidSurface};
 use plyflow_mechanics::model::Model;
 use plyflow_model::STANDARD_GRAVITY;
 use plyflow_model::scene::{Hold, Press, Towards};
-use plyflow_tooling::SignedDistanceGrid;
+use plyflow_tooling::{FieldError, SignedDistanceGrid};
 use std::sync::Arc;
 
 /// Mass of a holder that a force presses, over that of the plies: heavy enough to follow their contacts stably in
@@ -55,7 +55,8 @@ pub fn build_press(p: &Parameters, press: &Press, components: &dyn Components) -
             Some(Towards::Holder) => -STANDARD_GRAVITY,
         },
     ]);
-    add_contacts(&mut model, &stack, parts.placed, &plates, tool.field, p)?;
+    let rigid = rigid_parts(&plates, tool.field);
+    add_contacts(&mut model, &stack, parts.placed, &rigid, p)?;
     model.add_plane_contacts(&p.contact_settings());
     let mut load = press_load(press, &plates, &model);
     load.apply(&mut model, 0.0);
@@ -63,12 +64,11 @@ pub fn build_press(p: &Parameters, press: &Press, components: &dyn Components) -
     // Largest distance of a point from the axis (m).
     let from_axis = |q: &Vec3| q[0].fixed_hypot(q[1]);
     let reach = reference.iter().map(from_axis).fold(0.0, f64::max);
-    let (mut rigid, mut field_errors) = (Vec::new(), vec![(RigidName::Tool, tool.error)]);
-    for (name, plate) in plates.named() {
-        let body = RigidBody::plate(name, &plate, reach);
-        field_errors.push((name, body.error_against(&plate)));
-        rigid.push(body);
-    }
+    let (rigid, errors) = shown(&plates, reach);
+    let field_errors = [(RigidName::Tool, tool.error)]
+        .into_iter()
+        .chain(errors)
+        .collect();
     Ok(Forming {
         model,
         load: Load::Press(load),
@@ -85,6 +85,21 @@ pub fn build_press(p: &Parameters, press: &Press, components: &dyn Components) -
         start: None,
         element_size: p.element_size,
     })
+}
+
+/// The plates as they are shown, out to a radius that covers `reach` (m), and by how much that is off.
+fn shown(plates: &Plates, reach: f64) -> (Vec<RigidBody>, Vec<(RigidName, FieldError)>) {
+    let of = |(name, plate): (RigidName, OpenPlate)| {
+        let mesh = PlateMesh::new(&plate, reach);
+        let error = (name.clone(), mesh.error_against(&plate));
+        let body = RigidBody {
+            name,
+            above: plate.side > 0.0,
+            shape: RigidShape::Plate(mesh),
+        };
+        (body, error)
+    };
+    plates.named().map(of).unzip()
 }
 
 /// What moves in the press, as it starts.
@@ -119,13 +134,12 @@ fn press_load(press: &Press, plates: &Plates, model: &Model) -> PressLoad {
     }
 }
 
-/// Plies on each other, and on rigid parts.
-fn add_contacts(
+/// Plies on each other, and on the rigid parts of a press.
+pub fn add_contacts(
     model: &mut Model,
     stack: &[StackSheet],
     mut placed: Vec<Placed>,
-    plates: &Plates,
-    punch: SignedDistanceGrid,
+    rigid: &[RigidPart],
     p: &Parameters,
 ) -> Result<()> {
     for ply in &mut placed {
@@ -137,12 +151,12 @@ fn add_contacts(
         contacts.add_pair(model, pair[1], pair[0], 1.0)?;
     }
     contacts.add_past(model, &plies)?;
-    for part in rigid_parts(plates, punch) {
+    for part in rigid {
         for ply in &plies {
             let k = ply.place.0;
             let among = if part.above { k + 1..plies.len() } else { 0..k };
             let among: Vec<StackPlace> = among.map(StackPlace).collect();
-            contacts.add_rigid(model, &part, *ply, &among)?;
+            contacts.add_rigid(model, part, *ply, &among)?;
         }
     }
     for ply in &plies {
@@ -155,11 +169,11 @@ fn add_contacts(
 /// Punch, die, and holder if there is one.
 fn rigid_parts(plates: &Plates, punch: SignedDistanceGrid) -> Vec<RigidPart> {
     let part = |name: RigidName, surface: Arc<dyn RigidSurface>| RigidPart {
-        name,
         surface,
         above: name == RigidName::Die,
         film: None,
         moves: name != RigidName::Die,
+        name,
     };
     let mut parts = vec![part(RigidName::Tool, Arc::new(ToolSurface(punch)))];
     parts.extend(

@@ -68,7 +68,7 @@ pub fn build_local(
 fn process_of(scene: &Scene) -> Result<&DoubleDiaphragm> {
     match &scene.process {
         Process::DoubleDiaphragm(process) => Ok(process),
-        Process::Press(_) => Err(FormingError::Scene(format!(
+        Process::Press(_) | Process::Stamping(_) => Err(FormingError::Scene(format!(
             "scene '{}' is formed by a {}; local runs are built for double_diaphragm only. Run the whole scene with \
              bending elements instead: leave out the boundary",
             scene.name,

@@ -28,6 +28,8 @@ pub struct HistoryRow {
     pub punch_force: f64,
     /// Way of a press's holder towards the die (m).
     pub holder_travel: f64,
+    /// By rigid part of a stamping, and then by gripper: force on the plies (N), and way (m).
+    pub parts: Vec<[f64; 2]>,
     /// By sheet of the model.
     pub sheets: Vec<SheetEnergy>,
     /// By interface, in the order of [`Model::interface_energies`](plyflow_mechanics::model::Model::interface_energies).
@@ -80,6 +82,7 @@ impl HistoryRow {
             frame: forming.load.frame_height(m.time()),
             punch_force: n * press.map_or(0.0, |p| p.punch_force(m)),
             holder_travel: press.map_or(0.0, PressLoad::holder_travel),
+            parts: (forming.load.stamping()).map_or_else(Vec::new, |s| s.ways(m, n)),
             sheets: m.sheet_energies().iter().map(|e| e.times(n)).collect(),
             interfaces: m.interface_energies().map(|(_, e)| e.times(n)).collect(),
             depths: watched.now.iter().map(|d| d.depth).collect(),

@@ -77,6 +77,7 @@ fn phases(forming: &Forming) -> Vec<(&'static str, f64)> {
             .zip(cycle.durations)
             .collect(),
         Load::Press(press) => vec![("forming_time", press.stroke.forming)],
+        Load::Stamping(stamping) => vec![("forming_time", stamping.forming)],
         Load::Given { .. } => Vec::new(),
     }
 }
@@ -205,7 +206,7 @@ pub fn off_the_tool(forming: &Forming, watch: &Watch) -> Option<String> {
         return None;
     }
     forming.plies().find_map(|(body, sheet)| {
-        let off = watch.nearest(RigidName::Tool, body.sheet)?;
+        let off = watch.nearest(&RigidName::Tool, body.sheet)?;
         (off > OFF.max(OFF_THICKNESSES * sheet.thickness)).then(|| {
             format!(
                 "ply '{}' is nowhere on the tool at the end: it is {:.1} mm away where it is nearest. Nothing was formed. Look at the place of tool and ply, the \

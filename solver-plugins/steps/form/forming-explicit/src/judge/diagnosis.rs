@@ -85,7 +85,7 @@ fn longer(settling: f64) -> f64 {
 
 /// What to say of a part that has not come to rest between its diaphragms, with this `ratio` of kinetic to internal energy. A press ends its stroke in motion.
 pub fn still_moving(forming: &Forming, ratio: f64) -> Option<String> {
-    (forming.load.press().is_none() && ratio > AT_REST).then(|| {
+    (!forming.load.moves_parts() && ratio > AT_REST).then(|| {
         let longer = longer(forming.load.settling());
         format!(
             "the run has ended while the part was moving: kinetic energy is {:.1e} of internal energy, and {AT_REST:.0e} at most at rest. A sheet \

@@ -3,7 +3,9 @@
 pub mod cycle;
 pub mod press;
 pub mod process;
+pub mod stamping;
 
 pub use cycle::Cycle;
 pub use press::{HeldByForce, PressLoad, Stroke};
 pub use process::Load;
+pub use stamping::{ForceInTime, Grip, Motion, MovedPart, PressedPart, StampingLoad};

@@ -2,6 +2,7 @@
 
 use crate::load::cycle::Cycle;
 use crate::load::press::PressLoad;
+use crate::load::stamping::StampingLoad;
 use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::backend::{self, Loaded};
 use plyflow_mechanics::history::linear;
@@ -40,6 +41,8 @@ pub enum Load {
     },
     /// Punch and holder of a press.
     Press(PressLoad),
+    /// The parts and grippers of a stamping.
+    Stamping(StampingLoad),
 }
 
 impl Load {
@@ -56,6 +59,7 @@ impl Load {
         match self {
             Self::Process { cycle, .. } | Self::Given { cycle, .. } => cycle.duration(),
             Self::Press(p) => p.stroke.forming + p.stroke.settling,
+            Self::Stamping(s) => s.forming + s.settling,
         }
     }
 
@@ -64,6 +68,7 @@ impl Load {
         match self {
             Self::Process { cycle, .. } | Self::Given { cycle, .. } => cycle.settling(),
             Self::Press(p) => p.stroke.settling,
+            Self::Stamping(s) => s.settling,
         }
     }
 
@@ -72,16 +77,18 @@ impl Load {
         match self {
             Self::Process { cycle, .. } | Self::Given { cycle, .. } => cycle.phase(t),
             Self::Press(p) if t < p.stroke.forming => "forming",
-            Self::Press(_) => "settling",
+            Self::Stamping(s) if t < s.forming => "forming",
+            Self::Press(_) | Self::Stamping(_) => "settling",
         }
     }
 
-    /// Height of the frame at `t` (m); of a press's punch over its end.
+    /// Height of the frame at `t` (m); of a press's punch over its end, of the tool of a stamping over where it is drawn.
     pub fn frame_height(&self, t: f64) -> f64 {
         match self {
             Self::Process { cycle, .. } => cycle.frame_height(t),
             Self::Given { time, frame, .. } => linear(time, frame, t),
             Self::Press(p) => -p.stroke.left(t),
+            Self::Stamping(s) => s.tool_height(t),
         }
     }
 
@@ -91,6 +98,19 @@ impl Load {
             Self::Press(p) => Some(p),
             _ => None,
         }
+    }
+
+    /// The stamping, when it is one.
+    pub fn stamping(&self) -> Option<&StampingLoad> {
+        match self {
+            Self::Stamping(s) => Some(s),
+            _ => None,
+        }
+    }
+
+    /// Whether rigid parts move, and nothing is between films.
+    pub fn moves_parts(&self) -> bool {
+        matches!(self, Self::Press(_) | Self::Stamping(_))
     }
 
     /// What it remembers of the run.
@@ -106,6 +126,7 @@ impl Load {
             }
             Self::Given { .. } => Ok(()),
             Self::Press(p) => p.archive(a),
+            Self::Stamping(s) => s.archive(a),
         }
     }
 }
@@ -119,6 +140,7 @@ impl backend::Load for Load {
         }
         match self {
             Self::Press(p) => p.apply(on, t),
+            Self::Stamping(s) => s.apply(on, t),
             Self::Given {
                 time, cavity, bag, ..
             } => {

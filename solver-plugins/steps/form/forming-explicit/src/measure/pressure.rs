@@ -1,7 +1,7 @@
 //! What presses on sheets from the tool, and whether plies have touched themselves.
 
 use crate::forming::Forming;
-use crate::stack::{Body, RigidName};
+use crate::stack::{Body, RigidBody};
 use plyflow_geometry::vec3::{Vec3, dot, norm};
 use plyflow_mechanics::contact::RigidContact;
 use plyflow_model::scene::Scene;
@@ -11,9 +11,11 @@ impl Forming {
     pub fn contact_pressure(&self, body: &Body) -> Vec<f64> {
         let m = &self.model;
         let mut force = vec![0.0; m.x().len()];
-        // The die of a press lies on the other face, and a mirror plane beside the sheet.
-        let facing =
-            |c: &&RigidContact| !RigidName::Die.is_of(&c.name) && !c.name.starts_with("symmetry_");
+        // A part above, such as the die of a press, lies on the other face, and a mirror plane beside the sheet.
+        let above: Vec<&RigidBody> = self.rigid.iter().filter(|body| body.above).collect();
+        let facing = |c: &&RigidContact| {
+            !above.iter().any(|body| body.name.is_of(&c.name)) && !c.name.starts_with("symmetry_")
+        };
         for c in m.rigid_contacts().iter().filter(facing) {
             for i in &c.items {
                 force[i.node as usize] += f64::from(i.normal_force);

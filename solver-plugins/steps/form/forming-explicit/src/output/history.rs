@@ -15,6 +15,21 @@ pub fn write_history(host: &Host, forming: &Forming, outcome: &Outcome) -> Resul
         let data: Vec<f64> = outcome.history.iter().map(value).collect();
         host.write_f64(&format!("history/{name}"), &[data.len()], unit, &data)?;
     }
+    let Some(stamping) = forming.load.stamping() else {
+        return Ok(());
+    };
+    for (k, name) in stamping.names().enumerate() {
+        for (c, (what, unit)) in [("force", "N"), ("way", "m")].into_iter().enumerate() {
+            let rows = outcome.history.iter();
+            let data: Vec<f64> = rows.map(|r| r.parts.get(k).map_or(0.0, |p| p[c])).collect();
+            host.write_f64(
+                &format!("history/{name}/{what}"),
+                &[data.len()],
+                unit,
+                &data,
+            )?;
+        }
+    }
     Ok(())
 }
 

@@ -17,8 +17,8 @@ pub fn define_rigid(host: &Host, forming: &Forming) -> Result<()> {
     let triangles: Vec<u32> = tool.triangles.iter().flatten().copied().collect();
     host.define_mesh(RigidName::Tool.word(), &tool.points, 3, &triangles, &about)?;
     for part in &forming.rigid {
-        let cells = part.cells.as_flattened();
-        host.define_mesh(part.name.word(), &part.points, 4, cells, &about)?;
+        let (corners, cells) = part.cells();
+        host.define_mesh(part.name.word(), part.points(), corners, cells, &about)?;
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use crate::course::Outcome;
 use crate::forming::Forming;
-use crate::load::PressLoad;
+use crate::load::{PressLoad, StampingLoad};
 use crate::measure::{Penetration, ply_strains, too_deep_on_the_way};
 use crate::request::Parameters;
 use crate::stack::{Body, StackSheet};
@@ -74,6 +74,8 @@ pub fn warnings(forming: &Forming, outcome: &Outcome, now: &[Penetration]) -> Ve
             100.0 * LARGEST_FIBRE_STRAIN
         ));
     }
+    let stamping = forming.load.stamping();
+    warnings.extend(stamping.into_iter().flat_map(StampingLoad::never_touched));
     if forming.load.press().is_some_and(PressLoad::holder_is_bare) {
         warnings.push(
             "the plies have left the holder, which its force has pressed against the die: make the blank larger or the stroke shorter, or give the holder a gap"

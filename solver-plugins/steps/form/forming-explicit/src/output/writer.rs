@@ -89,17 +89,17 @@ impl Observer for Writer<'_> {
             self.frames
                 .put(&Part::Field(name(), false, field, unit, pressure))?;
         }
-        if forming.load.press().is_some() {
-            let moved = |points: &[Vec3], part: RigidName| -> Vec<Vec3> {
+        if forming.load.moves_parts() {
+            let moved = |points: &[Vec3], part: &RigidName| -> Vec<Vec3> {
                 let shift = forming.shift(part);
                 points.iter().map(|x| add(*x, shift)).collect()
             };
-            let tool = moved(&forming.tool.points, RigidName::Tool).into();
+            let tool = moved(&forming.tool.points, &RigidName::Tool).into();
             let name = RigidName::Tool.word().into();
             self.frames.put(&Part::Points(name, tool))?;
             for part in &forming.rigid {
-                let points = moved(&part.points, part.name).into();
-                let name = part.name.word().into();
+                let points = moved(part.points(), &part.name).into();
+                let name = Cow::from(part.name.word().to_owned());
                 self.frames.put(&Part::Points(name, points))?;
             }
         }

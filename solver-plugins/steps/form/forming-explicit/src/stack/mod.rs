@@ -22,6 +22,6 @@ pub use elements::{Components, Elements};
 pub use locate::inverse_bilinear;
 pub use parts::{Meshed, Parts, plain};
 pub use place::{Placed, SheetIndex, StackPlace, layers};
-pub use rigid::{RigidBody, RigidName};
+pub use rigid::{PlateMesh, RigidBody, RigidName, RigidShape};
 pub use sheet::StackSheet;
-pub use tool::{ToolSurface, ToolSurfaces};
+pub use tool::{PartSurface, ToolSurface, ToolSurfaces};

@@ -3,10 +3,11 @@
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::contact::{OpenPlate, RigidSurface};
-use plyflow_tooling::FieldError;
+use plyflow_tooling::{FieldError, ToolMesh};
+use std::sync::Arc;
 
 /// A rigid part, by the name that it has in scenes, contacts and artifacts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum RigidName {
     /// The tool; of a press the punch.
     Tool,
@@ -16,21 +17,24 @@ pub enum RigidName {
     Die,
     /// Of a press, below the plies.
     Holder,
+    /// Of a stamping, by its name in the scene.
+    Part(Arc<str>),
 }
 
 impl RigidName {
     /// The name.
-    pub fn word(self) -> &'static str {
+    pub fn word(&self) -> &str {
         match self {
             Self::Tool => "tool",
             Self::Bed => "bed",
             Self::Die => "die",
             Self::Holder => "holder",
+            Self::Part(name) => name,
         }
     }
 
     /// Whether a contact of that name is one with this part: those begin with the part's name and a slash.
-    pub fn is_of(self, contact: &str) -> bool {
+    pub fn is_of(&self, contact: &str) -> bool {
         let rest = contact.strip_prefix(self.word());
         rest.is_some_and(|r| r.starts_with('/'))
     }
@@ -41,7 +45,25 @@ impl RigidName {
 pub struct RigidBody {
     /// Which it is.
     pub name: RigidName,
-    /// Points at the start (m).
+    /// Whether it lies above the sheets.
+    pub above: bool,
+    /// What is shown of it where it is described.
+    pub shape: RigidShape,
+}
+
+/// What is shown of a rigid part.
+#[derive(Debug, Clone)]
+pub enum RigidShape {
+    /// A plate with a round opening.
+    Plate(PlateMesh),
+    /// Triangles.
+    Triangles(ToolMesh),
+}
+
+/// A plate with a round opening, as far as it is shown.
+#[derive(Debug, Clone)]
+pub struct PlateMesh {
+    /// Points (m).
     pub points: Vec<Vec3>,
     /// Quads.
     pub cells: Vec<[u32; 4]>,
@@ -50,6 +72,24 @@ pub struct RigidBody {
 }
 
 impl RigidBody {
+    /// Its points where it is described (m).
+    pub fn points(&self) -> &[Vec3] {
+        match &self.shape {
+            RigidShape::Plate(plate) => &plate.points,
+            RigidShape::Triangles(mesh) => &mesh.points,
+        }
+    }
+
+    /// Its cells, one after the other, and how many points each has.
+    pub fn cells(&self) -> (usize, &[u32]) {
+        match &self.shape {
+            RigidShape::Plate(plate) => (4, plate.cells.as_flattened()),
+            RigidShape::Triangles(mesh) => (3, mesh.triangles.as_flattened()),
+        }
+    }
+}
+
+impl PlateMesh {
     /// The largest difference of its cells, cut along their diagonals, from a plate: at the cells' middles, and those of their sides.
     pub fn error_against(&self, plate: &OpenPlate) -> FieldError {
         let corner = |n: u32| self.points[n as usize];
@@ -70,7 +110,7 @@ impl RigidBody {
     }
 
     /// The face of a plate out to a radius that covers `reach` (m), its rounding, and as much of the wall again.
-    pub fn plate(name: RigidName, plate: &OpenPlate, reach: f64) -> Self {
+    pub fn new(plate: &OpenPlate, reach: f64) -> Self {
         // Chords of 0.01 mm for what presses have: openings of 70 mm, roundings of 10 mm.
         const AROUND: usize = 192;
         const ALONG: usize = 16;
@@ -101,7 +141,6 @@ impl RigidBody {
             })
             .collect();
         Self {
-            name,
             points,
             cells,
             plate: *plate,

@@ -6,7 +6,7 @@ use crate::stack::place::SheetIndex;
 use plyflow_geometry::vec3::{Vec3, cross, norm, sub};
 use plyflow_mechanics::contact::RigidSurface;
 use plyflow_mechanics::model::Model;
-use plyflow_tooling::{RigidTool, SignedDistanceGrid, given};
+use plyflow_tooling::{PartField, RigidTool, SignedDistanceGrid, given};
 use std::sync::Arc;
 
 /// The tool of the scene, with its distance field.
@@ -26,6 +26,19 @@ impl RigidSurface for ToolSurface {
     }
 
     /// A field of the whole tool is too large for the cache.
+    fn is_costly(&self) -> bool {
+        true
+    }
+}
+
+/// A part of a stamping as contacts see it.
+pub struct PartSurface(pub PartField);
+
+impl RigidSurface for PartSurface {
+    fn distance(&self, point: Vec3) -> (f64, Vec3) {
+        self.0.distance_and_gradient(point)
+    }
+
     fn is_costly(&self) -> bool {
         true
     }

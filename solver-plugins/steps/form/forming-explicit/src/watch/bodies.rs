@@ -1,7 +1,7 @@
 //! What is watched: rigid parts, sheets, and the pairs of them.
 
 use crate::forming::Forming;
-use crate::stack::{RigidName, SheetIndex};
+use crate::stack::{RigidName, RigidShape, SheetIndex};
 use crate::watch::pairs::{Numbers, Pair, pairs};
 use crate::watch::rigid::{Part, Shape, Triangles};
 use crate::watch::sheet::SheetMesh;
@@ -49,7 +49,7 @@ impl Bodies {
             sheets,
             pairs,
             numbers,
-            stands_off: forming.load.press().is_none(),
+            stands_off: !forming.load.moves_parts(),
         }
     }
 
@@ -73,9 +73,12 @@ impl Bodies {
         part * self.sheets.len() + sheet
     }
 
-    /// Pair of the tool's edges with a sheet.
-    pub fn pair_with_edges(&self, sheet: usize) -> usize {
-        self.parts.len() * self.sheets.len() + sheet
+    /// Pair of the edges of a part, which has triangles, with a sheet, by their numbers here.
+    pub fn pair_with_edges(&self, part: usize, sheet: usize) -> usize {
+        match self.numbers.edges[part] {
+            Some(first) => first + sheet,
+            None => self.parts.len() * self.sheets.len() + sheet,
+        }
     }
 
     /// As [`Bodies::pair_of_sheets`], of a node at a place: what films do an element away from all plies, by the boxes around these, is a pair of its own.
@@ -112,10 +115,10 @@ fn parts(forming: &Forming) -> Vec<Part> {
             name: RigidName::Tool,
             shape: Shape::Tool(triangles),
             above: false,
-            error: forming.field_error(RigidName::Tool),
+            error: forming.field_error(&RigidName::Tool),
         });
     }
-    if forming.load.press().is_none() {
+    if !forming.load.moves_parts() {
         parts.push(Part {
             name: RigidName::Bed,
             shape: Shape::Bed,
@@ -123,11 +126,20 @@ fn parts(forming: &Forming) -> Vec<Part> {
             error: 0.0,
         });
     }
-    parts.extend(forming.rigid.iter().map(|body| Part {
-        name: body.name,
-        shape: Shape::Plate(body.plate),
-        above: body.plate.side > 0.0,
-        error: 0.0,
+    parts.extend(forming.rigid.iter().filter_map(|body| {
+        let (shape, error) = match &body.shape {
+            RigidShape::Plate(mesh) => (Shape::Plate(mesh.plate), 0.0),
+            RigidShape::Triangles(mesh) => (
+                Shape::Tool(Triangles::new(mesh)?),
+                forming.field_error(&body.name),
+            ),
+        };
+        Some(Part {
+            name: body.name.clone(),
+            shape,
+            above: body.above,
+            error,
+        })
     }));
     parts
 }

@@ -25,8 +25,10 @@ struct Place {
     turn: f64,
 }
 
-/// Convex edges of a tool.
+/// Convex edges of a rigid part.
 pub struct Edges {
+    /// Number of the part.
+    pub part: usize,
     places: Vec<Place>,
     /// By sheet and place: the sheet's triangle that was found last, near which the next search begins; [`UNKNOWN`] before.
     last: Vec<Vec<u32>>,
@@ -41,7 +43,7 @@ pub struct Look<'a> {
     pub mesh: &'a SheetMesh,
     pub tree: &'a SheetTree,
     pub bounds: [Vec3; 2],
-    /// Where the tool has moved (m).
+    /// Where the part has moved (m).
     pub shift: Vec3,
     /// Size of the elements (m).
     pub size: f64,
@@ -51,17 +53,20 @@ pub struct Look<'a> {
     pub error: f64,
     /// Depth (m) from which on it is told.
     pub floor: f64,
+    /// Whether the part lies above the sheet.
+    pub above: bool,
 }
 
 impl Edges {
-    /// Of a tool, for sheets with elements of these sizes (m).
-    pub fn new(tool: &ToolMesh, sizes: &[f64], mirrored: [bool; 2]) -> Self {
+    /// Of the part of a number, for sheets with elements of these sizes (m).
+    pub fn new(part: usize, tool: &ToolMesh, sizes: &[f64], mirrored: [bool; 2]) -> Self {
         let finest = sizes.iter().copied().fold(f64::INFINITY, f64::min);
         let spacing = finest / PER_ELEMENT;
         // In every box of that size the sharpest one.
         let mut boxes: BTreeMap<[i64; 3], Place> = BTreeMap::new();
         if !(spacing > 0.0 && spacing.is_finite()) {
             return Self {
+                part,
                 places: Vec::new(),
                 last: vec![Vec::new(); sizes.len()],
             };
@@ -80,6 +85,7 @@ impl Edges {
         }
         let places: Vec<Place> = boxes.into_values().collect();
         Self {
+            part,
             last: vec![vec![UNKNOWN; places.len()]; sizes.len()],
             places,
         }
@@ -130,12 +136,15 @@ fn depth(place: &Place, triangles: &Triangles, look: &Look<'_>, last: &mut u32) 
         return 0.0;
     };
     let near = look.mesh.closest(look.x, p, (cell, [0.0; 2]));
-    let depth = look.half + near.height;
-    if near.is_beside(look.size) || depth <= look.floor || near.height > look.size {
+    // Of a part above, all is the other way round.
+    let side = if look.above { -1.0 } else { 1.0 };
+    let height = side * near.height;
+    let depth = look.half + height;
+    if near.is_beside(look.size) || depth <= look.floor || height > look.size {
         return 0.0;
     }
     // A sheet over this edge looks the same way.
-    if dot(look.mesh.normal_in(look.x, near.cell), place.out) <= 0.0 {
+    if side * dot(look.mesh.normal_in(look.x, near.cell), place.out) <= 0.0 {
         return 0.0;
     }
     // What an element that bends over the edge cuts off with its diagonal, at most as for one whose diagonal turns by one radian.

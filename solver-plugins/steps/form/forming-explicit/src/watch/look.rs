@@ -1,7 +1,7 @@
 //! The watch over a run.
 
 use crate::forming::Forming;
-use crate::stack::{RigidName, SheetIndex};
+use crate::stack::{RigidName, RigidShape, SheetIndex};
 use crate::watch::against::{Clear, Found, View};
 use crate::watch::bodies::Bodies;
 use crate::watch::deep::{CHUNK, Deep, Peak, Watched};
@@ -24,7 +24,7 @@ pub struct Watch {
     clear: Vec<Vec<Clear>>,
     /// By pair of a part and a sheet: how far (m) the nearest node was from touching at the last look.
     nearest: Vec<f64>,
-    edges: Edges,
+    edges: Vec<Edges>,
 }
 
 impl Watch {
@@ -34,7 +34,7 @@ impl Watch {
         let sizes: Vec<f64> = bodies.sheets.iter().map(|s| s.size).collect();
         let never = |s: &Watcher| vec![Clear::NEVER; s.mesh.nodes.len() * bodies.parts.len()];
         Self {
-            edges: Edges::new(&forming.tool, &sizes, forming.model.planes().0),
+            edges: edges(forming, &bodies, &sizes),
             clear: bodies.sheets.iter().map(never).collect(),
             nearest: vec![f64::INFINITY; bodies.pairs.len()],
             bodies,
@@ -48,8 +48,8 @@ impl Watch {
 
     /// Of a rigid part and a sheet of the model: how far (m) the nearest node was from touching at the last look that ended a run.
     /// `None` where no node was looked at, because something else drives them all.
-    pub fn nearest(&self, part: RigidName, sheet: SheetIndex) -> Option<f64> {
-        let k = self.bodies.parts.iter().position(|p| p.name == part)?;
+    pub fn nearest(&self, part: &RigidName, sheet: SheetIndex) -> Option<f64> {
+        let k = self.bodies.parts.iter().position(|p| p.name == *part)?;
         let looked_at = self.bodies.sheets[sheet.0].free.contains(&true);
         looked_at.then(|| self.nearest[self.bodies.pair_with_part(k, sheet.0)])
     }
@@ -72,7 +72,7 @@ impl Watch {
         }
         let boxes: Vec<[Vec3; 2]> = sheets.iter().map(|s| s.mesh.bounds(model.x())).collect();
         let parts = self.bodies.parts.iter();
-        let shifts: Vec<Vec3> = parts.map(|p| forming.shift(p.name)).collect();
+        let shifts: Vec<Vec3> = parts.map(|p| forming.shift(&p.name)).collect();
         let bent: Vec<Bent> = sheets.iter().map(|s| Bent::new(&s.mesh)).collect();
         let moment = Moment {
             x: model.x(),
@@ -148,42 +148,66 @@ impl Watch {
         }
     }
 
-    /// Holds edges of the tool against the sheets' cells.
+    /// Holds edges of rigid parts against the sheets' cells.
     fn look_at_edges(&mut self, moment: &Moment<'_>, deepest: &mut [Deep]) {
         let bodies = &self.bodies;
-        let (Some(trees), Some(tool)) = (moment.trees, bodies.parts.first()) else {
-            return;
-        };
-        let Shape::Tool(triangles) = &tool.shape else {
-            return;
-        };
-        for (k, tree) in trees.iter().enumerate() {
-            let Some(tree) = tree else { continue };
-            let pair = bodies.pair_with_edges(k);
-            let sheet = &bodies.sheets[k];
-            let look = Look {
-                x: moment.x,
-                mesh: &sheet.mesh,
-                tree,
-                bounds: moment.boxes[k],
-                shift: moment.shifts[0],
-                size: sheet.size,
-                half: 0.5 * sheet.thickness,
-                error: tool.error,
-                floor: bodies.floor(pair, moment.last),
-            };
-            let Some(beyond) = bodies.numbers.beyond[k] else {
-                [deepest[pair], _] = self.edges.deepest(k, triangles, &look, |_| true);
+        let Some(trees) = moment.trees else { return };
+        for edges in &mut self.edges {
+            let (number, part) = (edges.part, &bodies.parts[edges.part]);
+            let Shape::Tool(triangles) = &part.shape else {
                 continue;
             };
-            // What a film does an element away from all plies no ply feels.
-            let on_plies = |at: Vec3| {
-                let mut trees = bodies.of_plies(trees).flatten();
-                trees.any(|tree| tree.cell_within(at, sheet.size, &mut { UNKNOWN }).is_some())
-            };
-            [deepest[pair], deepest[beyond]] = self.edges.deepest(k, triangles, &look, on_plies);
+            for (k, tree) in trees.iter().enumerate() {
+                let Some(tree) = tree else { continue };
+                let pair = bodies.pair_with_edges(number, k);
+                let sheet = &bodies.sheets[k];
+                let look = Look {
+                    x: moment.x,
+                    mesh: &sheet.mesh,
+                    tree,
+                    bounds: moment.boxes[k],
+                    shift: moment.shifts[number],
+                    size: sheet.size,
+                    half: 0.5 * sheet.thickness,
+                    error: part.error,
+                    floor: bodies.floor(pair, moment.last),
+                    above: part.above,
+                };
+                let Some(beyond) = bodies.numbers.beyond[k] else {
+                    [deepest[pair], _] = edges.deepest(k, triangles, &look, |_| true);
+                    continue;
+                };
+                // What a film does an element away from all plies no ply feels.
+                let on_plies = |at: Vec3| {
+                    let mut trees = bodies.of_plies(trees).flatten();
+                    trees.any(|tree| {
+                        let found = tree.cell_within(at, sheet.size, &mut { UNKNOWN });
+                        found.is_some()
+                    })
+                };
+                [deepest[pair], deepest[beyond]] = edges.deepest(k, triangles, &look, on_plies);
+            }
         }
     }
+}
+
+/// The edges of the rigid parts that have triangles, for sheets with elements of these sizes (m).
+fn edges(forming: &Forming, bodies: &Bodies, sizes: &[f64]) -> Vec<Edges> {
+    let mirrored = forming.model.planes().0;
+    let mesh_of = |name: &RigidName| match name {
+        RigidName::Tool => Some(&forming.tool),
+        other => {
+            let body = forming.rigid.iter().find(|body| body.name == *other)?;
+            match &body.shape {
+                RigidShape::Triangles(mesh) => Some(mesh),
+                RigidShape::Plate(_) => None,
+            }
+        }
+    };
+    let parts = bodies.parts.iter().enumerate();
+    parts
+        .filter_map(|(k, part)| Some(Edges::new(k, mesh_of(&part.name)?, sizes, mirrored)))
+        .collect()
 }
 
 /// Room for what is remembered of each node of the sheets.

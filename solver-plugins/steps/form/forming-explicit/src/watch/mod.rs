@@ -1,6 +1,6 @@
 //! An independent watch over what must stay outside of what: it shares no code with the contacts nor with the tool's distance field.
 //!
-//! At every row of the ledger each node of each sheet is held against the triangles of the tool, the bed or the plates of a press, and against
+//! At every row of the ledger each node of each sheet is held against the triangles of the tool and of other rigid parts, the bed or the plates of a press, and against
 //! the cells of the sheets below and above it in the stack: how much nearer their middle surfaces are than half of their thicknesses, and what
 //! really lies between them, allow. See decision 34.
 

@@ -1,7 +1,7 @@
 //! What is held against what.
 
-use crate::stack::StackSheet;
-use crate::watch::rigid::Part;
+use crate::stack::{RigidName, StackSheet};
+use crate::watch::rigid::{Part, Shape};
 
 /// Share of the thinner sheet beyond which a depth at the end is told.
 pub const DEPTH_BOUND: f64 = 0.1;
@@ -11,7 +11,7 @@ pub const DEPTH_BOUND: f64 = 0.1;
 pub enum Kind {
     /// Nodes against a part or a sheet.
     Nodes,
-    /// The tool's edges against the cells of a sheet.
+    /// Edges of the tool, or of another rigid part, against the cells of a sheet.
     Edges,
     /// A film's nodes against the cells of a ply. Plies carry films at their nodes; between them a film hangs through.
     Hangs,
@@ -38,6 +38,8 @@ pub struct Pair {
 pub struct Numbers {
     /// By film and ply: of what hangs through.
     pub hangs: Vec<Option<usize>>,
+    /// By part besides the first one, if it has triangles: of its edges with the first sheet; the others follow.
+    pub edges: Vec<Option<usize>>,
     /// By film: of edges of the tool that are an element away from all plies.
     pub beyond: Vec<Option<usize>>,
     /// Of the two films, and of the two where they are an element away from all plies.
@@ -72,10 +74,10 @@ impl Stack<'_> {
         }
     }
 
-    fn with_edges(&self, k: usize) -> Pair {
+    fn with_edges(&self, part: &str, k: usize) -> Pair {
         let thinner = self.sheets[k].thickness;
         Pair {
-            name: format!("tool_edges/{}", self.name(k)),
+            name: format!("{part}_edges/{}", self.name(k)),
             kind: Kind::Edges,
             thinner,
             bound: thinner.max(self.thinnest),
@@ -114,7 +116,7 @@ impl Stack<'_> {
         Pair {
             name: format!("tool_edges_off_plies/{}", self.name(film)),
             bound: f64::INFINITY,
-            ..self.with_edges(film)
+            ..self.with_edges("tool", film)
         }
     }
 
@@ -146,7 +148,7 @@ pub fn pairs(sheets: &[StackSheet], parts: &[Part], sizes: &[f64]) -> (Vec<Pair>
     let mut all: Vec<Pair> = (parts.iter().flat_map(with_part))
         .map(|(part, k)| stack.with_part(part, k))
         .collect();
-    all.extend((0..count).map(|k| stack.with_edges(k)));
+    all.extend((0..count).map(|k| stack.with_edges("tool", k)));
     let mut both_films = None;
     for high in 1..count {
         for low in 0..high {
@@ -176,8 +178,17 @@ pub fn pairs(sheets: &[StackSheet], parts: &[Part], sizes: &[f64]) -> (Vec<Pair>
         });
         [near, all.len() - 1]
     });
+    let mut edges = vec![None; parts.len()];
+    for (k, part) in parts.iter().enumerate() {
+        // Those of the tool have their place.
+        if part.name != RigidName::Tool && matches!(part.shape, Shape::Tool(_)) {
+            edges[k] = Some(all.len());
+            all.extend((0..count).map(|s| stack.with_edges(part.name.word(), s)));
+        }
+    }
     let numbers = Numbers {
         hangs,
+        edges,
         beyond,
         films,
     };

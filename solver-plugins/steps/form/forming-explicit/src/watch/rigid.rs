@@ -8,7 +8,7 @@ use plyflow_tooling::ToolMesh;
 
 /// What a rigid part is made of.
 pub enum Shape {
-    /// Its triangles.
+    /// The triangles of the tool, or of another part.
     Tool(Triangles),
     /// The plane z = 0.
     Bed,

@@ -85,7 +85,8 @@ pub fn depth_warnings(depths: &[PairDepth]) -> Vec<String> {
         let (mm, at) = (1e3 * d.end.depth, in_mm(d.end.place));
         match d.pair.kind {
             Kind::Edges => format!(
-                "an edge of the tool goes {mm:.2} mm through '{other}' between its nodes, at {at}: the elements of '{other}' are too long to bend around it. Take smaller ones (`element_size`, of films `diaphragm_element_size`), or round the edge"
+                "an edge of {} goes {mm:.2} mm through '{other}' between its nodes, at {at}: the elements of '{other}' are too long to bend around it. Take smaller ones (`element_size`, of films `diaphragm_element_size`), or round the edge",
+                edges_of(one)
             ),
             _ => format!(
                 "'{one}' and '{other}' end {mm:.3} mm deep in each other at {at}: {:.0} % of the thinner one, bound {:.0} %. The result is wrong there by as much. Take smaller elements there, or a smaller `time_step`, with which contacts are stiffer",
@@ -95,6 +96,14 @@ pub fn depth_warnings(depths: &[PairDepth]) -> Vec<String> {
         }
     })
     .collect()
+}
+
+/// Whose edges a pair is of.
+fn edges_of(one: &str) -> String {
+    match one.strip_suffix("_edges") {
+        Some(part) if part != "tool" => format!("'{part}'"),
+        _ => "the tool".to_owned(),
+    }
 }
 
 /// By pair, for the artifact.

@@ -16,6 +16,7 @@ mod refused;
 mod regions;
 mod sliding;
 mod small_part;
+mod stamping;
 mod symmetry;
 mod taken_up;
 mod tools;

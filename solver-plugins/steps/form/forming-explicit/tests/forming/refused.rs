@@ -182,9 +182,9 @@ fn a_wall_thinner_than_a_ply_says_so_and_thicker_ones_are_in_the_field() {
         .map_err(|e| e.to_string())
         .unwrap();
     assert!(
-        built.field_error(RigidName::Tool) <= 0.1 * PLY_THICKNESS,
+        built.field_error(&RigidName::Tool) <= 0.1 * PLY_THICKNESS,
         "{}",
-        built.field_error(RigidName::Tool)
+        built.field_error(&RigidName::Tool)
     );
     let (_folder, p) = of_block([100.0, 2.0, 30.0], 0.003, "1 um");
     assert_told(&refused(&p), &["0.100 x 0.002 x 0.030 mm", "is `unit`"]);
@@ -214,7 +214,7 @@ fn a_spacing_that_shows_nothing_of_the_tool_is_refused_with_one_that_does() {
     let built = build_global(&p, &BuiltIn)
         .map_err(|e| e.to_string())
         .unwrap();
-    assert!(built.field_error(RigidName::Tool) <= 0.1 * PLY_THICKNESS);
+    assert!(built.field_error(&RigidName::Tool) <= 0.1 * PLY_THICKNESS);
     // Of the tools that Plyflow draws itself as well.
     let p = bag(1, |p| p["tool_grid"] = json!(1.0));
     assert_told(&refused(&p), &["`tool_grid`, 1000 mm", "would do"]);
@@ -245,10 +245,10 @@ fn what_contacts_see_of_every_rigid_part_is_held_against_what_is_drawn_of_it() {
     let p = press(1, &json!({"gap": "0.003 m"}), |_| {});
     let built = build_global(&p, &BuiltIn).unwrap_or_else(|e| panic!("{e}"));
     for part in [RigidName::Tool, RigidName::Die, RigidName::Holder] {
-        let error = built.field_error(part);
+        let error = built.field_error(&part);
         assert!(error > 0.0 && error < 2e-5, "{part:?}: {error}");
     }
-    assert_eq!(built.field_error(RigidName::Bed), 0.0);
+    assert_eq!(built.field_error(&RigidName::Bed), 0.0);
 }
 
 #[test]

@@ -52,7 +52,7 @@ fn a_node_that_is_put_into_the_tool_is_told_by_how_far_and_where() {
     });
     let found = of(&depths, "tool/lower").end;
     // Half of the film besides; the field's error is let be.
-    let expected = 1e-4 + 4e-5 - forming.field_error(RigidName::Tool);
+    let expected = 1e-4 + 4e-5 - forming.field_error(&RigidName::Tool);
     assert!(
         (found.depth - expected).abs() < 1e-9,
         "{found:?}, not {expected}"
