@@ -4,8 +4,8 @@
 usage: check_report.py [--screenshots FOLDER] REPORT.html...
 
 Fails on any error in the console, any request but the page itself, a file of 5 MB or more; with formed plies also
-unless the 3D view draws in several colours and changes when it is dragged, turned by keys, asked for another field, for lines or without
-its bodies, the first screen has its answers above the fold at 1280 x 800, and a defect is highlighted in the table, on the maps and in the view; of a study unless its table sorts, its marks lead to
+unless the 3D view draws in several colours and changes when it is dragged, turned by keys, asked for another field, for lines, for an earlier moment or without
+its bodies, of two runs side by side both views move together, the first screen has its answers above the fold at 1280 x 800, and a defect is highlighted in the table, on the maps and in the view; of a study unless its table sorts, its marks lead to
 their points and it fits a phone. Needs chromium, chromium-driver
 and the package selenium. Exit code 0: all as it should be.
 """
@@ -48,6 +48,7 @@ return [...document.querySelectorAll('table.points tbody tr')].map((row) => {
   return {text: cell.textContent.trim(), value: cell.dataset.value ?? null, place: row.dataset.place};
 });
 """
+SLIDE = "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'));"
 FRAME = "const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(done));"
 
 
@@ -156,11 +157,18 @@ def check_view(page, section):
     assert len(alike) <= 1, f"choosing {alike} changes nothing in the 3D view"
     options[0].click()
     plain = page.look(canvas)["mark"]
-    for box in section.find_elements(By.CSS_SELECTOR, "input[data-show='mesh'], input[data-show='edges']"):
+    for box in section.find_elements(By.CSS_SELECTOR, "input[data-show='mesh'], input[data-show='edges'], input[data-show='fibres']"):
         what = box.get_attribute("data-show")
         page.changes([canvas], f"asking for {what}", box.click)
         box.click()
         assert page.look(canvas)["mark"] == plain, f"something of {what} is left when it is off again"
+    for slider in section.find_elements(By.CSS_SELECTOR, "input[data-moment]"):
+        at = lambda value: page.driver.execute_script(SLIDE, slider, value)
+        page.changes([canvas], "going back in time", lambda: at(0))
+        told = section.find_element(By.CSS_SELECTOR, "output").text
+        assert told.endswith(" ms"), f"the moment is told as {told}"
+        at(slider.get_attribute("max"))
+        assert page.look(canvas)["mark"] == plain, "the end of the way is not what was shown at first"
     for box in section.find_elements(By.CSS_SELECTOR, "input[data-show='tool'], input[data-show='ply']"):
         box.click()
     assert page.look(canvas)["covered"] == 0, "something is left when all bodies are off"
@@ -185,6 +193,22 @@ def check_answer(page):
         assert page.all("tr.lit"), "a place of the first screen is not highlighted in the table"
         place.click()
     return "four answers"
+
+
+def check_beside(page):
+    """Two runs side by side: what is done to one view happens to the other."""
+    canvases = page.all(".view3d canvas")
+    for first, second in zip(canvases[::2], canvases[1::2]):
+        page.to(second)
+        page.changes([second], "turning the other view", lambda: first.send_keys(Keys.ARROW_LEFT))
+        page.changes([first], "resetting the other view", lambda: second.send_keys("0"))
+    selects = page.all(".view3d select")
+    options = selects[0].find_elements(By.CSS_SELECTOR, "option")
+    options[-1].click()
+    shown = [s.find_element(By.CSS_SELECTOR, "option:checked").text for s in selects[:2]]
+    assert shown[0] == shown[1], f"the views show {shown}"
+    options[0].click()
+    return f"{len(canvases)} linked views"
 
 
 def check_defects(page):
@@ -285,7 +309,9 @@ def check(path, folder):
             said.append(check_view(page, section))
         if page.all("#answer"):
             said.append(check_answer(page))
-        if page.all(".view3d"):
+        if page.all("body.beside"):
+            said.append(check_beside(page))
+        elif page.all(".view3d"):
             said.append(check_defects(page))
         if page.all("table.points"):
             said.append(check_study(page, path))

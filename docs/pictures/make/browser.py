@@ -100,6 +100,46 @@ def report_limits():
     return photograph(with_limits(), "report-limits", 1280, 660, lambda driver: driver.execute_script(TO_HEADING, "Limits"), scale=1)
 
 
+def choose(driver, field: str, *lines: str):
+    """In the first 3D view: colours by a field, and lines on request."""
+    driver.execute_script("""
+const view = document.querySelector('.view3d'), select = view.querySelector('select');
+select.value = [...select.options].find((o) => o.textContent.startsWith(arguments[0])).value;
+select.dispatchEvent(new Event('change'));
+for (const box of view.querySelectorAll('input[data-show]')) if (arguments[1].includes(box.parentElement.textContent.trim())) box.click();
+""", field, list(lines))
+
+
+def report_fibres():
+    """The 3D view of the coarse spar: how far the first fibre family has turned, with its lines."""
+    def prepare(driver):
+        WebDriverWait(driver, PATIENCE).until(lambda d: d.find_element("css selector", ".view3d").get_attribute("data-ready"))
+        choose(driver, "Fibre deviation, family 1", "Fibres 1")
+        driver.execute_script(TO_HEADING, "Formed plies in 3D")
+    return photograph(with_limits(), "report-fibres", 760, 640, prepare, scale=1)
+
+
+def report_inputs():
+    """Ply book and tool of the coarse spar."""
+    return photograph(with_limits(), "report-inputs", 1060, 880, lambda driver: driver.execute_script(TO_HEADING, "What went in"), scale=1)
+
+
+# The friction between plies, before and after.
+CHANGE = tuple(f"{step}.scene.friction.fabric_fabric=0.2" for step in ("coarse", "local"))
+
+
+def report_beside():
+    """Two runs of the coarse spar side by side: what differs, and the limits."""
+    with_limits()
+    file, *store = runs.run("joggle-spar/with-limits")
+    change = [word for value in CHANGE for word in ("--set", value)]
+    runs.plyflow("run", file, *store, *change, "--no-report", "--quiet")
+    other = [word for value in CHANGE for word in ("--beside-set", value)]
+    path = runs.STORE / "report-beside.html"
+    runs.plyflow("report", file, *store, "--beside", file, *other, "--output", str(path))
+    return photograph(path, "report-beside", 1160, 740, lambda driver: None, scale=1)
+
+
 def study():
     """The page of a study: the largest shear over the ply's angle and size, as a map."""
     def prepare(driver):

@@ -7,7 +7,7 @@ mod drawing;
 use crate::boundary::loops;
 use crate::error::ExportError;
 use crate::file::File;
-use crate::net::fibres;
+use crate::net::{Net, TooMany, fibres, rounded_up};
 use crate::part::{Body, Part, Ply};
 use crate::request::Request;
 use crate::vec3::Vec3;
@@ -41,24 +41,49 @@ pub fn write(
             flat.closed_plane(reached, &at(&body.flat));
             draped.line(edge, &at(&body.points), true);
         }
-        // Said with the fields already where they are not known.
-        let Some(directions) = ply.sheet.fibres() else {
-            continue;
-        };
-        for (family, angle) in directions.into_iter().enumerate() {
-            let layer = format!("{name}-fibres_{}", family + 1);
-            let (on_flat, on_draped) = (flat.layer(&layer, 8), draped.layer(&layer, 8));
-            for fibre in fibres(body, angle, part.scale * request.net, part.scale)? {
-                flat.open_plane(on_flat, &fibre.flat);
-                draped.line(on_draped, &fibre.formed, false);
-            }
-        }
+        draw_fibres((body, ply), part.scale, request, [&mut flat, &mut draped])?;
     }
     for (what, drawing) in [("flat", flat), ("draped", draped)] {
         files.push(File::of_text(
             format!("{}-{what}.dxf", request.stem),
             drawing.finish(),
         ));
+    }
+    Ok(())
+}
+
+/// Draws the fibre lines of a ply, flat and draped. That they are not known has been said with the fields already.
+fn draw_fibres(
+    (body, ply): (&Body, &Ply),
+    scale: f64,
+    request: &Request,
+    [flat, draped]: [&mut Drawing; 2],
+) -> Result<(), ExportError> {
+    let Some(directions) = ply.sheet.fibres() else {
+        return Ok(());
+    };
+    let through = body.usable();
+    let net = Net {
+        flat: &body.flat,
+        formed: &body.points,
+        cells: &body.cells,
+        corners: body.k,
+        through: &through,
+    };
+    let refused = |e: TooMany| ExportError::Net {
+        given: request.net,
+        ply: body.name.clone(),
+        lines: e.lines,
+        most: e.most,
+        would: rounded_up(e.would / scale),
+    };
+    for (family, angle) in directions.into_iter().enumerate() {
+        let layer = format!("{}-fibres_{}", body.name, family + 1);
+        let (on_flat, on_draped) = (flat.layer(&layer, 8), draped.layer(&layer, 8));
+        for fibre in fibres(&net, angle, scale * request.net).map_err(refused)? {
+            flat.open_plane(on_flat, &fibre.flat);
+            draped.line(on_draped, &fibre.formed, false);
+        }
     }
     Ok(())
 }

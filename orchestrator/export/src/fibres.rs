@@ -2,6 +2,7 @@
 
 use crate::vec3::{Vec3, add_scaled, cross, dot, norm, scaled, sub, unit};
 use plyflow_fixed::FixedBits;
+use std::f64::consts::PI;
 
 /// What the shape of a formed cell tells, at its middle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,6 +61,31 @@ pub fn sheared(flat: &[Vec3], formed: &[Vec3], fibres: [f64; 2]) -> Option<Shear
         area_ratio: norm(across) / flat_area,
         normal,
     })
+}
+
+/// The least part of the x axis that a formed ply must keep for [`deviations`]: the ply's normal is then at least 30 degrees off that axis.
+const LEAST_OF_AXIS: f64 = 0.5;
+
+/// How far the fibres of a formed cell have turned from the directions as laid (rad, -pi/2 to pi/2, counter-clockwise about the cell's normal).
+///
+/// A direction as laid counts on the formed ply as it does on the flat one: from the x axis, which is projected onto the cell, about the cell's
+/// normal. `laid` are the directions of the families in the flat ply (rad, from x). `None` where the cell stands so steeply across the x axis that
+/// its projection has no direction to speak of.
+#[must_use]
+pub fn deviations(cell: &Sheared, laid: [f64; 2]) -> Option<[f64; 2]> {
+    let n = cell.normal;
+    let axis = add_scaled([1.0, 0.0, 0.0], -n[0], n);
+    if norm(axis) < LEAST_OF_AXIS {
+        return None;
+    }
+    let across = cross(n, axis);
+    let of = |family: usize| {
+        let f = cell.directions[family];
+        let turned = dot(f, across).fixed_atan2(dot(f, axis)) - laid[family];
+        // A fibre has no head: directions that differ by half a turn are one.
+        turned - (turned / PI).round() * PI
+    };
+    Some([of(0), of(1)])
 }
 
 #[cfg(test)]
@@ -128,5 +154,59 @@ mod tests {
         assert_eq!(sheared(&FLAT, &line, [0.0, 1.0]), None);
         let back = [FLAT[3], FLAT[2], FLAT[1], FLAT[0]];
         assert_eq!(sheared(&back, &FLAT, [0.0, 1.0]), None);
+    }
+
+    /// The deviations (deg) of a flat square of a ply at +-45 deg after `to`.
+    fn deviation_after(to: impl Fn(Vec3) -> Vec3) -> Option<[f64; 2]> {
+        let laid = [-FRAC_PI_4, FRAC_PI_4];
+        let cell = sheared(&FLAT, &FLAT.map(|p| to([p[0], p[1], 0.0])), laid).unwrap();
+        deviations(&cell, laid).map(|d| d.map(f64::to_degrees))
+    }
+
+    fn near(found: Option<[f64; 2]>, expected: [f64; 2]) {
+        let found = found.unwrap();
+        let off = (0..2).map(|k| (found[k] - expected[k]).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-9, "{found:?} {expected:?}");
+    }
+
+    #[test]
+    fn a_ply_that_is_folded_over_an_edge_along_or_across_x_has_no_deviation() {
+        for fold in [0.3, 1.2, 1.5, -1.2] {
+            let (s, c) = f64::sin_cos(fold);
+            near(deviation_after(|p| [p[0], c * p[1], s * p[1]]), [0.0; 2]);
+        }
+        // About y up to 60 deg; a wall that stands more steeply across the axis is not judged.
+        let about_y = |fold: f64| {
+            let (s, c) = fold.sin_cos();
+            deviation_after(move |p| [c * p[0], p[1], s * p[0]])
+        };
+        near(about_y(1.0), [0.0; 2]);
+        assert_eq!(about_y(1.1), None);
+    }
+
+    #[test]
+    fn shear_turns_one_family_or_both_and_a_turn_of_the_ply_counts_too() {
+        let (s, c) = 0.1f64.sin_cos();
+        let turned = deviation_after(|p| [c * p[0] - s * p[1], s * p[0] + c * p[1], 0.0]);
+        near(turned, [0.1f64.to_degrees(); 2]);
+        // Pulled along x: both families turn towards it, by half of the shear angle each.
+        let k = 10f64.to_radians();
+        let stretched = (FRAC_PI_4 - k).tan();
+        near(
+            deviation_after(|p| [p[0], stretched * p[1], 0.0]),
+            [10.0, -10.0],
+        );
+        // On a wall along x, and seen from its outer side, the same.
+        near(
+            deviation_after(|p| [p[0], 0.0, -stretched * p[1]]),
+            [10.0, -10.0],
+        );
+    }
+
+    #[test]
+    fn a_wrinkle_whose_crest_runs_down_a_wall_is_no_deviation() {
+        // A wall that stands on x, and on it the flank of a wrinkle: turned about z by 30 deg.
+        let (s, c) = 30f64.to_radians().sin_cos();
+        near(deviation_after(|p| [c * p[0], s * p[0], -p[1]]), [0.0; 2]);
     }
 }

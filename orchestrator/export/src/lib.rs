@@ -2,7 +2,7 @@
 //!
 //! [`export`] reads one artifact and nothing else. At one frame it computes for each ply what its flat and its formed mesh tell: the directions
 //! of both fibre families, the angle between them, the thickness at constant volume and the areal mass. It gives the files as bytes, and
-//! says what they do not hold. The same artifact gives the same bytes on every machine (`plyflow_fixed`, sums and orders that are fixed, no clock).
+//! says what they do not hold. The report draws with the same computations ([`sheared`], [`deviations`], [`fibres()`]). The same artifact gives the same bytes on every machine (`plyflow_fixed`, sums and orders that are fixed, no clock).
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
@@ -22,8 +22,9 @@ mod vec3;
 mod vtu;
 
 pub use error::ExportError;
-pub use fibres::{Sheared, sheared};
+pub use fibres::{Sheared, deviations, sheared};
 pub use file::File;
+pub use net::{Fibre, Net, TooMany, fibres};
 pub use request::{Format, Frames, LengthUnit, Request};
 
 use part::Part;

@@ -33,5 +33,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         print!("{}", plyflow_report::summary(&input, Some(&out)));
         println!("{size} bytes");
     }
+    let (first, second) = (folder.join("first"), folder.join("second"));
+    for sub in [&first, &second] {
+        std::fs::create_dir_all(sub)?;
+    }
+    let (a, mut b) = (common::whole(&first), common::Study::new(&second));
+    b.scene["friction"]["fabric_fabric"] = serde_json::json!(0.2);
+    b.forming("coarse", None, 0.004);
+    b.defects(false);
+    plyflow_report::write_beside([&a, &b.input()], &folder.join("beside.html"))?;
     Ok(())
 }

@@ -29,4 +29,4 @@ pub(crate) use sharpness::Sharpness;
 pub(crate) use small::{Look, Series};
 pub(crate) use svg::{px, spot};
 pub(crate) use variable_axis::VariableAxis;
-pub(crate) use view::{FormedView, Mark, Overlay, Side, flat, formed};
+pub(crate) use view::{FormedView, Mark, Overlay, Side, flat, formed, tool_picture};

@@ -105,6 +105,70 @@ pub(crate) fn largest(input: &ReportInput, material: &Material) -> Vec<(LimitOn,
     all
 }
 
+/// A wrinkle or a place of bridging, with all its sizes.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Found {
+    pub(crate) name: String,
+    pub(crate) ply: String,
+    pub(crate) zone: Option<String>,
+    /// `[x, y]` (m), where it is in the flat ply.
+    pub(crate) at: [f64; 2],
+    /// Of a wrinkle (m).
+    pub(crate) height: Option<f64>,
+    /// Of a wrinkle's crest (m); else 0.
+    pub(crate) length: f64,
+    /// Of bridging (m).
+    pub(crate) gap: Option<f64>,
+}
+
+impl Found {
+    pub(crate) fn is_wrinkle(&self) -> bool {
+        self.height.is_some()
+    }
+
+    /// Height or gap (m).
+    pub(crate) fn size(&self) -> f64 {
+        self.height.or(self.gap).unwrap_or(0.0)
+    }
+}
+
+/// All wrinkles and places of bridging that were measured.
+pub(crate) fn found(input: &ReportInput, material: &Material) -> Vec<Found> {
+    let none = Limits::default();
+    let mut all: Vec<Found> = Vec::new();
+    for study in judged_studies(material) {
+        let look = defects::Look::new(input, material, study);
+        for on in [
+            LimitOn::WrinkleHeight,
+            LimitOn::WrinkleLength,
+            LimitOn::BridgingGap,
+        ] {
+            for f in look.evidence(on, &none).findings {
+                let Some(name) = f.name else { continue };
+                let same = |d: &&mut Found| {
+                    (&d.name, &d.ply, &d.zone, d.at) == (&name, &f.ply, &f.zone, f.at)
+                };
+                if on == LimitOn::WrinkleLength {
+                    if let Some(known) = all.iter_mut().find(same) {
+                        known.length = f.value;
+                    }
+                    continue;
+                }
+                all.push(Found {
+                    name,
+                    ply: f.ply,
+                    zone: f.zone,
+                    at: f.at,
+                    height: (on == LimitOn::WrinkleHeight).then_some(f.value),
+                    length: 0.0,
+                    gap: (on == LimitOn::BridgingGap).then_some(f.value),
+                });
+            }
+        }
+    }
+    all
+}
+
 /// The runs that are judged: those that something looked at; else those of a solver, else all. A drape by geometry that stands beside a run
 /// with forces says nothing that the run does not say better.
 pub(crate) fn judged_studies(material: &Material) -> Vec<&Study> {

@@ -6,6 +6,7 @@
 //! and join tables with maps; without them everything else is there. Workflows with artifacts of
 //! unknown kinds get a page with their steps, results and costs.
 
+mod beside;
 mod draw;
 mod family;
 mod input;
@@ -58,7 +59,11 @@ pub enum ReportError {
 /// # Errors
 /// When the file cannot be written or a picture not be encoded.
 pub fn write_report(input: &ReportInput, out: &Utf8Path) -> Result<u64, ReportError> {
-    let mut page = drawn(Content::read(input)?)?;
+    written(drawn(Content::read(input)?)?, out)
+}
+
+/// Seals a page and writes it; gives its size in bytes.
+fn written(mut page: String, out: &Utf8Path) -> Result<u64, ReportError> {
     page += &sealed_by(&page);
     let wrong = |source| ReportError::Write {
         path: out.to_owned(),
@@ -69,6 +74,22 @@ pub fn write_report(input: &ReportInput, out: &Utf8Path) -> Result<u64, ReportEr
     }
     plyflow_artifact::whole::write(out.as_std_path(), page.as_bytes()).map_err(wrong)?;
     Ok(page.len() as u64)
+}
+
+/// Writes the page of two runs side by side to `out`, as [`write_report`] does, and returns its size in bytes. Neither may be a study.
+///
+/// # Errors
+/// When the file cannot be written or a picture not be encoded.
+pub fn write_beside(inputs: [&ReportInput; 2], out: &Utf8Path) -> Result<u64, ReportError> {
+    let sides = beside::Sides::read(inputs);
+    let mut page = String::new();
+    for sharp in Sharpness::ALL {
+        page = page::beside::page(&sides, sharp)?;
+        if page.len() <= LARGEST {
+            break;
+        }
+    }
+    written(page, out)
 }
 
 /// The page with the finest pictures for which there is room.

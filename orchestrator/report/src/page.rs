@@ -1,6 +1,7 @@
 //! The page.
 
 mod answer;
+pub(crate) mod beside;
 mod carried;
 mod carried_tables;
 pub(crate) mod content;
@@ -9,6 +10,7 @@ mod energy;
 pub(crate) mod expectations;
 mod family;
 mod fidelity;
+mod inputs;
 mod maps;
 mod provenance;
 mod steps;
@@ -57,6 +59,7 @@ pub(crate) fn page(
     for (n, study) in material.studies.iter().enumerate() {
         studies.push(study_sections(study, n, drawn, sharp)?);
     }
+    let inputs = inputs::section(material, sharp)?;
     let steps = steps::section(content, sharp)?;
     let page = html! {
         (DOCTYPE)
@@ -69,6 +72,7 @@ pub(crate) fn page(
                     @if let Some(points) = &points { (points) }
                     (answer::all_limits(input))
                     @for study in &studies { (study) }
+                    (inputs)
                     (steps)
                     (fidelity::section(rest))
                     (expectations::section(input))
@@ -176,6 +180,7 @@ fn contents(content: &Content<'_>, large: bool) -> Markup {
         (maps, "#maps-0", "Maps"),
         (local, "#local-0", "Local runs"),
         (compared, "#defects-0", "Defects"),
+        (inputs::has(material), "#inputs", "What went in"),
         (plots, "#plots", steps),
         (ways, "#fidelity", "Speed against error"),
         (expected, "#expectations", "Expectations"),

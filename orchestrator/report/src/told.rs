@@ -41,7 +41,9 @@ pub fn allowed_text(j: &Judged) -> String {
     let limit = quantity(j.limit, j.on.unit(), DIGITS);
     match j.on {
         LimitOn::ShearNegative => format!("at least {limit}"),
-        LimitOn::Shear | LimitOn::FibreStrain => format!("at most ±{limit}"),
+        LimitOn::Shear | LimitOn::FibreStrain | LimitOn::FibreDeviation => {
+            format!("at most ±{limit}")
+        }
         _ => format!("at most {limit}"),
     }
 }

@@ -64,6 +64,16 @@ pub(crate) fn quantity(value: f64, unit: &str, digits: i32) -> String {
     join(number(value * factor, digits), name)
 }
 
+/// A difference with its sign and unit: `+3 mm`, `−1.5 mm`.
+pub(crate) fn signed(value: f64, unit: &str) -> String {
+    let text = quantity(value, unit, 3);
+    if value > 0.0 {
+        format!("+{text}")
+    } else {
+        text.replacen('-', "−", 1)
+    }
+}
+
 /// A number text and a unit, if there is one.
 pub(crate) fn join(number: String, unit: &str) -> String {
     if unit.is_empty() {

@@ -74,6 +74,37 @@ fn defects_are_judged_by_the_fine_runs_and_shear_by_every_cell_of_the_finest_run
 }
 
 #[test]
+fn fibre_deviation_is_judged_by_the_formed_direction_of_both_families() {
+    let (_keep, folder) = folder();
+    // The half-pipe bends about x, which turns no fibre. Around it the plies are longer than the flat ones, by 2 mm over 60 mm of the outer one.
+    let input = with(
+        whole(&folder),
+        json!({"fibre_deviation": "2 deg", "places": [
+        {"name": "flat end", "rectangle": {"centre": ["-110 mm", "60 mm"], "length": "10 mm", "width": "20 mm"}, "fibre_deviation": "1 deg"}]}),
+    );
+    let part = of(&input, LimitOn::FibreDeviation, None);
+    assert_eq!(part.verdict, Kept::Beyond, "{part:?}");
+    let worst = part.worst.unwrap();
+    assert!(
+        worst.by.starts_with("local["),
+        "the wave is in a zone: {worst:?}"
+    );
+    assert!(worst.value.abs() > 2f64.to_radians() && worst.value.abs() < 45f64.to_radians());
+    let end = of(&input, LimitOn::FibreDeviation, Some("flat end"));
+    assert_eq!(end.verdict, Kept::Within);
+    let (worst, exact) = (
+        end.worst.unwrap(),
+        (0.062f64 / 0.06).atan() - 45f64.to_radians(),
+    );
+    assert!(
+        (worst.value.abs() - exact).abs() < 1e-3 * exact + 1e-4,
+        "{worst:?}"
+    );
+    let page = page(&input, &folder);
+    assert!(page.contains("fibre deviation") && page.contains("at most ±1 deg"));
+}
+
+#[test]
 fn in_a_zone_the_cells_of_the_whole_do_not_count() {
     let (_keep, folder) = folder();
     let [x0, y0, x1, y1] = ZONES[0].1;

@@ -112,8 +112,8 @@ fn a_whole_study_shows_every_section_in_one_file_without_network() {
         assert!(page.contains(&format!("id=\"{id}\"")), "section {id}");
         assert!(page.contains(&format!("href=\"#{id}\"")), "link to {id}");
     }
-    // 3 quantities on 2 plies, flat and formed from two sides; per zone and ply 3 flat and 1 formed.
-    assert_eq!(page.matches("data:image/png;base64,").count(), 18 + 16);
+    // 3 quantities on 2 plies, flat and formed from two sides; per zone and ply 3 flat and 1 formed; the tool among what went in.
+    assert_eq!(page.matches("data:image/png;base64,").count(), 18 + 16 + 1);
     assert!(page.contains("2 zones; 2 wrinkles, longest 68.4 mm; 2 bridging areas."));
     assert!(page.contains("Kinetic energy at most 2.3 % of internal (bound 5 %)."));
     assert!(page.contains("1 of 3 expectations missed, 1 not judged"));
@@ -272,7 +272,7 @@ fn local_runs_are_shown_without_a_comparison() {
     let page = page(&study.input(), &folder);
     assert!(page.contains("Zone A") && !page.contains("id=\"defects-0\""));
     // The shear alone is known of the local run: flat and formed, on two plies.
-    assert_eq!(page.matches("data:image/png;base64,").count(), 18 + 4);
+    assert_eq!(page.matches("data:image/png;base64,").count(), 18 + 4 + 1);
     // Nobody has looked for wrinkles in it.
     assert_eq!(page.matches(": not compared").count(), 2);
     assert!(!page.contains("no wrinkle, no bridging") && !page.contains("outlines: wrinkles"));
@@ -360,7 +360,7 @@ fn of_several_runs_of_a_zone_the_finest_is_shown_and_with_a_comparison_the_compa
     compared.instances = study.instances.clone();
     let alone = page(&study.input(), &folder);
     let shown = |page: &str, size: &str| page.contains(&format!("elements of {size} mm"));
-    assert_eq!(alone.matches("data:image/png;base64,").count(), 18 + 4);
+    assert_eq!(alone.matches("data:image/png;base64,").count(), 18 + 4 + 1);
     assert!(shown(&alone, "2") && !shown(&alone, "4") && !shown(&alone, "6"));
     compared.comparison(&common::ZONES[..1]);
     let beside = page(&compared.input(), &folder);

@@ -63,6 +63,26 @@ impl Scene {
         all
     }
 
+    /// Lines of a list of bodies, outlines or defects.
+    fn lines(&mut self, one: &Value) -> Vec<Vec<f64>> {
+        let counts = list(&one["lines"]);
+        counts
+            .iter()
+            .map(|n| self.points(n.as_u64().unwrap()))
+            .collect()
+    }
+
+    /// Points on the way, which are coarser.
+    fn coarse_points(&mut self, count: u64) -> Vec<f64> {
+        let number = |v: &Value| v.as_f64().unwrap();
+        let extent = self.told["extent"].clone();
+        let largest = list(&extent["size"]).iter().map(number).fold(0.0, f64::max);
+        let step = largest / number(&self.told["way"]["places"]);
+        let taken = self.take(3 * count, 2, 3);
+        let place = |(i, v): (usize, &u64)| number(&extent["low"][i % 3]) + *v as f64 * step;
+        taken.iter().enumerate().map(place).collect()
+    }
+
     fn points(&mut self, count: u64) -> Vec<f64> {
         let number = |v: &Value, d: usize| v[d].as_f64().unwrap();
         let taken = self.take(3 * count, 2, 3);
@@ -109,6 +129,17 @@ fn a_ply_comes_back_from_the_page_as_it_lies_in_the_artifact() {
             .iter()
             .map(|_| scene.take(body["points"].as_u64().unwrap(), 1, 1))
             .collect();
+        for fibres in list(&body["fibres"]) {
+            scene.lines(&fibres);
+        }
+        let edges = body["edges"].as_u64().unwrap();
+        let ends: Vec<Vec<f64>> = (0..edges).map(|_| scene.points(2)).collect();
+        // The half-pipe is open all around: its rim is an edge, and no other.
+        let rim = |e: &Vec<f64>| e[0] == e[3] || (e[1].abs() - 0.0593).abs() < 1e-3;
+        assert!(
+            (n == 0) == (edges == 82) && ends.iter().all(rim),
+            "{n}: {edges}"
+        );
         if n != 1 {
             continue;
         }
@@ -128,18 +159,116 @@ fn a_ply_comes_back_from_the_page_as_it_lies_in_the_artifact() {
         expected.sort_unstable();
         assert_eq!(quads, expected);
         // 0 to 5 mm on the scale of the distance.
-        let place = |d: &f64| (d / 0.005).clamp(0.0, 1.0) * 255.0;
+        let place = |d: &f64| 1.0 + (d / 0.005).clamp(0.0, 1.0) * 254.0;
         let wrong = |(v, d): (&u64, &f64)| (*v as f64 - place(d)).abs() > 0.6;
         assert!(!fields[1].iter().zip(&distance).any(wrong));
     }
     for kind in ["outlines", "defects"] {
         for one in list(&scene.told[kind]) {
-            for n in list(&one["lines"]) {
-                scene.points(n.as_u64().unwrap());
-            }
+            scene.lines(&one);
         }
     }
+    on_the_way(&mut scene, &bodies, &formed);
     assert_eq!(scene.at, scene.bytes.len(), "all is told");
+}
+
+/// The made-up run has a frame in which its plies are flat, and the last one.
+fn on_the_way(scene: &mut Scene, bodies: &[Value], formed: &[[f64; 3]]) {
+    let way = scene.told["way"].clone();
+    assert_eq!(way["times"], serde_json::json!([0.0, 1.0]));
+    assert_eq!(
+        way["bodies"],
+        serde_json::json!([1, 2]),
+        "those of the whole"
+    );
+    let fields = list(&way["fields"]);
+    let name = |k: &Value| scene.told["fields"][k.as_u64().unwrap() as usize]["name"].clone();
+    let names: Vec<Value> = fields.iter().map(name).collect();
+    assert_eq!(
+        names,
+        [
+            "Shear angle",
+            "Fibre deviation, family 1",
+            "Fibre deviation, family 2"
+        ]
+    );
+    for k in list(&way["bodies"]) {
+        let count = bodies[k.as_u64().unwrap() as usize]["points"]
+            .as_u64()
+            .unwrap();
+        let points = scene.coarse_points(count);
+        let flat = points
+            .chunks(3)
+            .zip(formed)
+            .all(|(p, f)| p[2].abs() < 2e-4 && (p[0] - f[0]).abs() < 2e-4);
+        assert!(
+            flat,
+            "the first moment is the flat ply, within a quarter of a millimetre"
+        );
+        let shades: Vec<Vec<u64>> = fields.iter().map(|_| scene.take(count, 1, 1)).collect();
+        // A flat ply has no deviation: the middle of its scale.
+        assert!(
+            shades[1].iter().chain(&shades[2]).all(|v| *v == 128),
+            "{:?}",
+            &shades[1][..4]
+        );
+    }
+}
+
+#[test]
+fn lines_of_fibres_run_along_their_families_and_are_parted_at_the_zones_with_finer_plies() {
+    let (_keep, folder) = folder();
+    let page = page(&whole(&folder), &folder);
+    let mut scene = Scene::of(&page);
+    assert!(
+        page.contains("Lines of fibres are 7.5 mm apart")
+            || page.contains("Lines of fibres are 10 mm apart")
+    );
+    let mut seen = Vec::new();
+    for body in list(&scene.told["bodies"]) {
+        let count = body["points"].as_u64().unwrap();
+        scene.points(count);
+        for part in list(&body["parts"]) {
+            scene.take(4 * part["cells"].as_u64().unwrap(), 4, 4);
+        }
+        for _ in list(&body["fields"]) {
+            scene.take(count, 1, 1);
+        }
+        for fibres in list(&body["fibres"]) {
+            let family = fibres["family"].as_u64().unwrap();
+            seen.push((
+                body["ply"].clone(),
+                body["zone"].clone(),
+                fibres["zone"].clone(),
+                family,
+            ));
+            for line in scene.lines(&fibres) {
+                assert!(line.len() >= 6);
+                // Where the half-pipe has no wave, a fibre at +-45 deg turns by its angle about the pipe: y goes with x, to one side or the other.
+                let (a, b) = (&line[..3], &line[line.len() - 3..]);
+                let (along, around) = (b[0] - a[0], b[1].atan2(b[2]) - a[1].atan2(a[2]));
+                let sign = if family == 0 { -1.0 } else { 1.0 };
+                let off = (sign * around * 0.061 - along).abs();
+                assert!(
+                    off < 0.012 + 0.2 * along.abs(),
+                    "{along} {around} of family {family}"
+                );
+            }
+        }
+        for _ in 0..body["edges"].as_u64().unwrap() {
+            scene.points(2);
+        }
+    }
+    let is = |ply: &str, own: Value, part: Value| {
+        let of = seen
+            .iter()
+            .filter(|s| s.0 == ply && s.1 == own && s.2 == part);
+        of.count()
+    };
+    assert_eq!(is("ply_1", Value::Null, Value::Null), 2, "{seen:?}");
+    assert_eq!(is("ply_2", Value::Null, "A".into()), 2);
+    assert_eq!(is("ply_2", "B".into(), Value::Null), 2);
+    assert!(seen.iter().all(|s| !s.0.is_null()), "a tool has no fibres");
 }
 
 #[test]
@@ -280,17 +409,25 @@ fn every_field_of_the_plies_is_in_the_menu_with_its_unit_and_what_is_the_same_ev
         }
         for field in list(&body["fields"]) {
             let found = scene.take(count, 1, 1);
+            // 1 to 255 are places on the scale.
+            let found: Vec<u64> = found.iter().map(|v| v - 1).collect();
             if n == 1 && field == wanted {
                 // Places on one scale from nought on: in proportion, as far as it does not end.
                 let top = size.iter().copied().fold(0.0, f64::max);
                 let at = size.iter().position(|s| *s > 0.3 * top && *s < 0.5 * top);
                 let unit = found[at.unwrap()] as f64 / size[at.unwrap()];
                 let wrong = |(v, s): (&u64, &f64)| {
-                    *v < 255 && (*v as f64 - unit * s).abs() > 1.0 + 0.02 * unit * s
+                    *v < 254 && (*v as f64 - unit * s).abs() > 1.0 + 0.02 * unit * s
                 };
                 assert!(!found.iter().zip(&size).any(wrong));
                 return;
             }
+        }
+        for fibres in list(&body["fibres"]) {
+            scene.lines(&fibres);
+        }
+        for _ in 0..body["edges"].as_u64().unwrap() {
+            scene.points(2);
         }
     }
     panic!("ply_1 has no displacement");

@@ -389,6 +389,12 @@ pub struct ReportArgs {
     /// Of a study: write the page of this point, by its name, into a folder beside the study's page; may be repeated
     #[arg(long, value_name = "NAME")]
     pub point: Vec<String>,
+    /// Write a page of two runs side by side: this one, and that of another workflow file (or of the same with `--beside-set`)
+    #[arg(long, value_name = "FILE", conflicts_with = "point")]
+    pub beside: Option<Utf8PathBuf>,
+    /// As `--set`, for the workflow of `--beside`; may be repeated
+    #[arg(long, value_name = "STEP.PARAMETER=VALUE", requires = "beside")]
+    pub beside_set: Vec<String>,
 }
 
 /// `plugins`

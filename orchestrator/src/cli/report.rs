@@ -13,7 +13,9 @@ use crate::exit;
 use crate::said::{Done, Stop, print};
 use camino::{Utf8Path, Utf8PathBuf};
 use plyflow_model::job::Record;
-use plyflow_report::{Expectation, Instance, Kept, ReportInput, is_current, judge, write_report};
+use plyflow_report::{
+    Expectation, Instance, Kept, ReportInput, is_current, judge, write_beside, write_report,
+};
 
 /// `plyflow report`.
 ///
@@ -21,6 +23,9 @@ use plyflow_report::{Expectation, Instance, Kept, ReportInput, is_current, judge
 /// When there is nothing to report or the file cannot be written; [`exit::DAMAGED`] when something is damaged: a page with gaps would pass for
 /// the whole.
 pub fn report(args: &ReportArgs) -> Done {
+    if let Some(other) = &args.beside {
+        return two(args, other);
+    }
     let opened = open(&args.workflow)?;
     let mut session = opened.look()?;
     let damages = recheck(&mut session, &|_| true, Depth::Artifacts);
@@ -54,6 +59,53 @@ pub fn report(args: &ReportArgs) -> Done {
     print(&format!("{path}: {}\n", super::table::bytes(bytes)))
 }
 
+/// `plyflow report A --beside B`: two runs on one page.
+fn two(args: &ReportArgs, other: &Utf8Path) -> Done {
+    let first = &args.workflow;
+    let second = Workflow {
+        workflow: other.to_owned(),
+        places: first.places.clone(),
+        set: args.beside_set.clone(),
+        confirm: None,
+    };
+    let name = format!("beside-{}", other.file_stem().unwrap_or("workflow"));
+    let path = args.output.clone().unwrap_or_else(|| {
+        let alone = beside(&first.workflow, &[]);
+        let stem = alone.file_stem().unwrap_or("report");
+        alone.with_file_name(format!("{stem}-{name}.html"))
+    });
+    let mut inputs = Vec::new();
+    for given in [first, &second] {
+        let opened = open(given)?;
+        if opened.workflow.study.is_some() {
+            let text = format!(
+                "{}: it is a study, which has a run for each of its points; expected a workflow without `study`: \
+                 give the values of a point by `--set` and `--beside-set` to the workflow without it",
+                given.workflow
+            );
+            return Err(Stop::new(exit::USAGE, text));
+        }
+        let mut session = opened.look()?;
+        let damages = recheck(&mut session, &|_| true, Depth::Artifacts);
+        if !damages.is_empty() {
+            return concluded(Ok(()), &damages, given);
+        }
+        tell_gone(&session);
+        let found = Found::read(&session);
+        if found.records.is_empty() {
+            return Err(Stop::new(exit::USAGE, nothing_yet(&session, &[], given)));
+        }
+        let failures: Vec<Failure> = (0..session.core.instances().len())
+            .filter_map(|id| session.failed_before(id))
+            .collect();
+        let asked = (given, &[][..], path.as_path());
+        inputs.push(input(&opened, &session, &found, &failures, asked));
+    }
+    let both = [&inputs[0], &inputs[1]];
+    let bytes = write_beside(both, &path).map_err(|e| Stop::new(exit::INTERNAL, e))?;
+    print(&format!("{path}: {}\n", super::table::bytes(bytes)))
+}
+
 /// The report of a workflow file: `report.html` for `workflow.yaml`, `report-coarse.html` for
 /// `workflow-coarse.yaml`, `flat-report.html` for `flat.yaml`. A run of a part (`until`) has a page of its own,
 /// `report-until-zones.html`: it must not take the place of the whole's.
@@ -72,7 +124,7 @@ pub fn beside(workflow: &Utf8Path, until: &[String]) -> Utf8PathBuf {
 }
 
 /// Changes with what a page shows of the same artifacts: an older page is then written again.
-const LAYOUT: &[u8] = b"page 10";
+const LAYOUT: &[u8] = b"page 11";
 
 /// Names all that a report depends on. `page`: where it lies.
 pub fn fingerprint(

@@ -84,6 +84,24 @@ impl Scale {
         Self { palette, low, high }
     }
 
+    /// From the smallest to the largest value, each rounded outwards to a round number of the unit `per` (a factor from SI).
+    pub(crate) fn fitted([low, high]: [f64; 2], per: f64) -> Self {
+        let [low, high] = [low * per, high * per];
+        let span = (high - low)
+            .max(1e-3 * low.abs().max(high.abs()))
+            .max(1e-12);
+        let power = 10f64.powf((span / 8.0).log10().floor());
+        let steps = [1.0, 2.0, 5.0, 10.0].map(|s| s * power);
+        let step = steps.into_iter().find(|s| *s >= span / 8.0);
+        let step = step.unwrap_or(10.0 * power);
+        let [first, last] = [(low / step + 1e-6).floor(), (high / step - 1e-6).ceil()];
+        Self {
+            palette: Palette::Viridis,
+            low: first * step / per,
+            high: last.max(first + 1.0) * step / per,
+        }
+    }
+
     /// Place of a value in 0..1, not clamped.
     pub(crate) fn place(&self, value: f64) -> f64 {
         (value - self.low) / (self.high - self.low)
@@ -91,7 +109,7 @@ impl Scale {
 }
 
 /// The end of a scale that shows the part `quantile` of the sizes in `values`, at least `least`, rounded up to
-/// 1, 1.5, 2, 3, 4, 5, 6, 8 times a power of ten of the unit `per` (a factor from SI).
+/// 1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8 times a power of ten of the unit `per` (a factor from SI).
 pub(crate) fn end_of_scale(
     values: impl Iterator<Item = f64>,
     quantile: f64,
@@ -107,7 +125,7 @@ pub(crate) fn end_of_scale(
     };
     let value = size.max(least).max(1e-12) * per;
     let power = 10f64.powf(value.log10().floor());
-    let steps = [1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
+    let steps = [1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
     let step = (steps.into_iter())
         .find(|s| s * power >= value * (1.0 - 1e-9))
         .unwrap_or(10.0);
@@ -150,9 +168,22 @@ mod tests {
     }
 
     #[test]
+    fn a_fitted_scale_begins_and_ends_at_round_numbers_about_its_values() {
+        let of = |range, per| {
+            let Scale { low, high, .. } = Scale::fitted(range, per);
+            [low, high].map(|v| (v * per * 1e6).round() / 1e6)
+        };
+        assert_eq!(of([0.000_391, 0.000_462], 1e3), [0.39, 0.47]);
+        assert_eq!(of([0.0, 1.0], 1.0), [0.0, 1.0]);
+        // The same everywhere: still a scale.
+        let [low, high] = of([0.0004, 0.0004], 1e3);
+        assert!(low <= 0.4 && high >= 0.4 && high > low, "{low} {high}");
+    }
+
+    #[test]
     fn scales_end_at_round_numbers_and_ignore_a_few_outliers() {
         let values = (0..1000).map(|i| if i == 7 { 1.0 } else { 0.0023 });
-        assert_eq!(end_of_scale(values, 0.995, 0.0, 1e3), 0.003);
+        assert_eq!(end_of_scale(values, 0.995, 0.0, 1e3), 0.0025);
         assert_eq!(end_of_scale(std::iter::empty(), 0.995, 0.002, 1e3), 0.002);
     }
 }

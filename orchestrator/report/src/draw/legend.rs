@@ -10,6 +10,10 @@ use plyflow_model::artifact::Defects;
 /// A sheet that moved less than this (m) lies flat.
 const LEAST_DEFLECTION: f64 = 1e-5;
 
+/// What a deviation of fibres is.
+const TURNED: &str = "Angle from the direction as laid to the fibres of the formed ply, counter-clockwise seen from above the ply. On the formed \
+                      ply the direction as laid counts from the x axis, which is projected onto it; grey where the ply stands across that axis.";
+
 /// A mapped quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Field {
@@ -18,11 +22,23 @@ pub(crate) enum Field {
     Curvature,
     /// Of coupons, which have no tool.
     Deflection,
+    /// At constant volume.
+    Thickness,
+    /// Of the first and the second fibre family: how far it has turned from the direction as laid.
+    Deviation1,
+    Deviation2,
 }
 
 impl Field {
     /// Those of a forming run.
     pub(crate) const ALL: [Self; 3] = [Self::Shear, Self::Distance, Self::Curvature];
+    /// What follows from the shape, and what of a run is known in every frame.
+    pub(crate) const OF_SHAPE: [Self; 3] = [Self::Thickness, Self::Deviation1, Self::Deviation2];
+
+    /// Whether it is known in every frame of a run, and not only in the last one.
+    pub(crate) fn is_known_on_the_way(self) -> bool {
+        self == Self::Shear || Self::OF_SHAPE.contains(&self)
+    }
 
     /// Title, SI unit and explanation.
     fn about(self) -> [&'static str; 3] {
@@ -48,6 +64,13 @@ impl Field {
                 "m",
                 "How far the sheet moved out of its plane.",
             ],
+            Self::Thickness => [
+                "Thickness",
+                "m",
+                "Of the sheared and stretched ply at constant volume: that of the flat ply over the ratio of areas.",
+            ],
+            Self::Deviation1 => ["Fibre deviation, family 1", "rad", TURNED],
+            Self::Deviation2 => ["Fibre deviation, family 2", "rad", TURNED],
         }
     }
 
@@ -57,9 +80,9 @@ impl Field {
             Self::Distance => ply.distance.clone(),
             Self::Curvature => ply.curvature.clone(),
             Self::Deflection => ply.deflection.clone(),
-            Self::Shear => {
+            Self::Shear | Self::Thickness | Self::Deviation1 | Self::Deviation2 => {
                 let nodes = ply.cells.as_flattened();
-                Some(at_points(ply.shear.as_ref()?, nodes, 4, ply.flat.len()))
+                Some(at_points(self.stored(ply)?, nodes, 4, ply.flat.len()))
             }
         }
     }
@@ -70,6 +93,20 @@ impl Field {
             Self::Distance => ply.distance.as_deref(),
             Self::Curvature => ply.curvature.as_deref(),
             Self::Deflection => ply.deflection.as_deref(),
+            Self::Thickness => ply.shape.thickness.as_deref(),
+            Self::Deviation1 => ply.shape.deviation.as_ref().map(|d| d[0].as_slice()),
+            Self::Deviation2 => ply.shape.deviation.as_ref().map(|d| d[1].as_slice()),
+        }
+    }
+
+    /// The values from which its scale follows: of both families there is one scale.
+    fn on_scale(self, ply: &Ply) -> Vec<&[f64]> {
+        match self {
+            Self::Deviation1 | Self::Deviation2 => {
+                let both = ply.shape.deviation.iter().flatten();
+                both.map(Vec::as_slice).collect()
+            }
+            _ => self.stored(ply).into_iter().collect(),
         }
     }
 
@@ -93,7 +130,7 @@ impl Field {
                 all
             }
             Self::Distance => t.distance_threshold.into_iter().collect(),
-            Self::Curvature | Self::Deflection => Vec::new(),
+            _ => Vec::new(),
         }
     }
 
@@ -108,9 +145,20 @@ impl Field {
         let limits = self.limits(detection);
         let [title, unit, _] = self.about();
         let (factor, _) = shown(unit);
-        let end = |part, least| end_of_scale(values(), part, least, factor);
+        let shown = || {
+            plies
+                .iter()
+                .flat_map(|p| self.on_scale(p))
+                .flatten()
+                .copied()
+        };
+        let end = |part, least| end_of_scale(shown(), part, least, factor);
         let scale = match self {
             Self::Shear => Scale::about_zero(Palette::BlueRed, end(0.995, 0.02)),
+            Self::Deviation1 | Self::Deviation2 => {
+                Scale::about_zero(Palette::BlueRed, end(0.995, 0.02))
+            }
+            Self::Thickness => Scale::fitted(range_of(values())?, factor),
             Self::Deflection => {
                 Scale::about_zero(Palette::PurpleOrange, end(1.0, LEAST_DEFLECTION))
             }

@@ -6,6 +6,8 @@ use base64::Engine;
 
 /// Samples per pixel and direction.
 const FINE: usize = 2;
+/// Cosine of the angle from which on two faces meet at a sharp edge: 35 degrees.
+const CREASE: f64 = 0.819_152_044_288_992;
 
 // As in the geometry of the plugins, which what draws runs cannot use: orchestrator and plugins share the schemas alone.
 fn dot(a: Vec3, b: Vec3) -> f64 {
@@ -225,15 +227,12 @@ impl Canvas {
         } = *surface;
         let mean = |q: [Vec3; 4]| [0, 1, 2].map(|d| (q[0][d] + q[1][d] + q[2][d] + q[3][d]) / 4.0);
         let points = mesh.extended(points, mean);
-        let shade = if lift.is_some() {
-            let dark = if matches!(paint, Paint::Plain(_)) {
-                0.42
-            } else {
-                0.75
-            };
-            shades(&points, mesh, camera.light(), dark)
-        } else {
-            vec![1.0; points.len()]
+        let plain = matches!(paint, Paint::Plain(_));
+        let shade = match (lift.is_some(), plain) {
+            (false, _) => vec![[1.0; 3]; mesh.corners.len()],
+            // What stands for no value is shaded face by face at its sharp edges, so that these are seen.
+            (true, true) => shades(&points, mesh, camera.light(), 0.42, CREASE),
+            (true, false) => shades(&points, mesh, camera.light(), 0.75, -1.0),
         };
         let place: Vec<f64> = match paint {
             Paint::Plain(_) => vec![0.0; points.len()],
@@ -251,7 +250,7 @@ impl Canvas {
                     (y * s) as f32,
                     (z + lift.unwrap_or(0.0)) as f32,
                     place[i] as f32,
-                    shade[i],
+                    1.0,
                 ]
             })
             .collect();
@@ -261,8 +260,10 @@ impl Canvas {
                 Paint::Field(_, scale) => scale.palette.at(t).map(|c| c * shade),
             }
         };
-        for t in &mesh.corners {
-            self.triangle(t.map(|i| on_screen[i as usize]), &colour);
+        for (t, shade) in mesh.corners.iter().zip(&shade) {
+            let mut corners = t.map(|i| on_screen[i as usize]);
+            (0..3).for_each(|k| corners[k][4] = shade[k]);
+            self.triangle(corners, &colour);
         }
     }
 
@@ -375,18 +376,31 @@ fn samples(low: f32, high: f32, end: usize) -> (usize, usize) {
     )
 }
 
-/// Light at each point, from `dark` where it only grazes to 1, from normals averaged over the triangles around it; both sides are lit.
-fn shades(points: &[Vec3], mesh: &Triangles, light: Vec3, dark: f64) -> Vec<f32> {
-    let mut normals = vec![[0.0; 3]; points.len()];
-    for t in &mesh.corners {
+/// Light at the corners of each triangle, from `dark` where it only grazes to 1; both sides are lit. Normals are sums over the triangles around a
+/// point, by area, of those that meet the own one at less than the angle of cosine `crease`.
+fn shades(points: &[Vec3], mesh: &Triangles, light: Vec3, dark: f64, crease: f64) -> Vec<[f32; 3]> {
+    let normal = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|i| points[i as usize]);
-        let n = cross(sub(b, a), sub(c, a));
-        for i in t {
-            (0..3).for_each(|d| normals[*i as usize][d] += n[d]);
-        }
+        cross(sub(b, a), sub(c, a))
+    };
+    let faces: Vec<Vec3> = mesh.corners.iter().map(normal).collect();
+    let units: Vec<Vec3> = faces.iter().map(|n| unit(*n)).collect();
+    let mut around: Vec<Vec<u32>> = vec![Vec::new(); points.len()];
+    for (t, corners) in (0u32..).zip(&mesh.corners) {
+        corners.iter().for_each(|i| around[*i as usize].push(t));
     }
-    let shade = |n: &Vec3| (dark + (1.04 - dark) * dot(unit(*n), light).abs()).min(1.0) as f32;
-    normals.iter().map(shade).collect()
+    let shade = |n: Vec3| (dark + (1.04 - dark) * dot(unit(n), light).abs()).min(1.0) as f32;
+    let corner = |t: usize, i: u32| {
+        let own = |u: &&u32| dot(units[t], units[**u as usize]) >= crease || **u as usize == t;
+        let mut sum = [0.0; 3];
+        for u in around[i as usize].iter().filter(own) {
+            (0..3).for_each(|d| sum[d] += faces[*u as usize][d]);
+        }
+        shade(sum)
+    };
+    let all = mesh.corners.iter().enumerate();
+    all.map(|(t, corners)| corners.map(|i| corner(t, i)))
+        .collect()
 }
 
 #[cfg(test)]
@@ -397,6 +411,35 @@ mod tests {
     fn square(z: f64) -> (Vec<Vec3>, Triangles) {
         let points = vec![[0.0, 0.0, z], [1.0, 0.0, z], [1.0, 1.0, z], [0.0, 1.0, z]];
         (points, Triangles::of_quads(4, &[[0, 1, 2, 3]]))
+    }
+
+    #[test]
+    fn faces_that_meet_at_a_sharp_edge_are_shaded_each_by_itself() {
+        let points = [
+            [0.0, 0.0, 1.0],
+            [1.0, 0.0, 1.0],
+            [1.0, 1.0, 1.0],
+            [0.0, 1.0, 1.0],
+            [1.0, 0.0, 0.0],
+            [1.0, 1.0, 0.0],
+        ];
+        let mesh = Triangles {
+            points: 6,
+            centres: vec![],
+            corners: vec![[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]],
+        };
+        let light = unit([0.0, 0.0, 1.0]);
+        let sharp = shades(&points, &mesh, light, 0.5, CREASE);
+        assert!(
+            sharp[..2].as_flattened().iter().all(|s| *s == 1.0),
+            "{sharp:?}"
+        );
+        assert!(
+            sharp[2..].as_flattened().iter().all(|s| *s == 0.5),
+            "{sharp:?}"
+        );
+        let smooth = shades(&points, &mesh, light, 0.5, -1.0);
+        assert!(smooth[2][0] > 0.5 && smooth[0][1] < 1.0, "{smooth:?}");
     }
 
     #[test]

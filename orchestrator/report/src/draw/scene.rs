@@ -1,23 +1,31 @@
 //! The formed plies, the finer plies of the zones and the tool of a study, as data for the rotatable view of the page.
 
+mod body;
+mod fibres;
 mod pack;
 mod thin;
+mod way;
 
 use crate::draw::error::DrawError;
 use crate::draw::legend::{Legend, Others};
 use crate::draw::sharpness::Sharpness;
 use crate::draw::view::lift;
-use crate::plain::{Locator, Place, Ply, Tool, Vec3, normal, outline};
+use crate::plain::{Frames, Locator, Place, Ply, Tool, Vec3, normal, outline};
+use body::Body;
+use fibres::ToldFibres;
 use pack::{Extent, Stream, script_json};
 use plyflow_model::artifact::Zone;
 use serde::Serialize;
 use thin::Thinned;
+use way::{ToldWay, Way};
 
 /// Points of all meshes of a page at full sharpness; about 10 bytes each on the page.
 const POINTS: f64 = 120_000.0;
 /// Fields besides those that are mapped take so many bytes on a page at full sharpness, at most. A value is one of 256 places on its scale,
 /// which is what a screen shows.
 const ROOM: f64 = 1_200_000.0;
+/// Sharp edges of a tool; more are no edges but a rough surface.
+const EDGES: usize = 6000;
 /// Meshes of fewer points than this would be stamps: they are left out.
 const LEAST: usize = 60;
 /// Points along the outline of a zone are this far apart (m).
@@ -34,6 +42,10 @@ pub(crate) struct Shown<'a> {
     pub(crate) places: &'a [Place],
     /// The fields that are mapped.
     pub(crate) legends: Vec<Legend>,
+    /// The plies of the global run on their way.
+    pub(crate) frames: Option<&'a Frames>,
+    /// Plies of other views that share the scales.
+    pub(crate) beside: &'a [&'a Ply],
 }
 
 /// A scene, ready for the page.
@@ -41,14 +53,10 @@ pub(crate) struct Shown<'a> {
 pub(crate) struct Scene {
     /// What the script reads.
     pub(crate) json: String,
-    /// Names of what can be shown and hidden.
-    pub(crate) plies: Vec<String>,
-    pub(crate) zones: Vec<String>,
-    pub(crate) tool: bool,
+    /// What can be shown and hidden.
+    pub(crate) seen: Seen,
     /// What is shown coarser than it is, or not at all.
     pub(crate) notes: Vec<String>,
-    /// Whether the cells of all plies are those that were computed.
-    pub(crate) elements: bool,
     /// The fields of the menu.
     pub(crate) legends: Vec<Legend>,
     /// Fields that are the same everywhere, and those for which the page has no room.
@@ -56,6 +64,23 @@ pub(crate) struct Scene {
     pub(crate) left_out: Vec<String>,
     /// Whether there are defects to choose from.
     pub(crate) defects: bool,
+    /// How far apart lines of fibres are in the flat ply (m), where there are any.
+    pub(crate) fibres: Option<f64>,
+    /// The moments that can be shown, the last one included; empty without a way.
+    pub(crate) times: Vec<f64>,
+    /// How exact places on the way are (m).
+    pub(crate) coarse: f64,
+}
+
+/// What of a scene can be shown and hidden.
+#[derive(Debug)]
+pub(crate) struct Seen {
+    /// Names of plies and of zones.
+    pub(crate) plies: Vec<String>,
+    pub(crate) zones: Vec<String>,
+    pub(crate) tool: bool,
+    /// Whether the cells of all plies are those that were computed.
+    pub(crate) elements: bool,
 }
 
 /// What the script is told. Places are in metres; arrays lie in `data`, in the order of what is listed here.
@@ -68,6 +93,7 @@ struct Told {
     bodies: Vec<ToldBody>,
     outlines: Vec<ToldOutline>,
     defects: Vec<ToldDefect>,
+    way: Option<ToldWay>,
     data: String,
 }
 
@@ -90,6 +116,10 @@ struct ToldBody {
     parts: Vec<Part>,
     /// Indices of the fields that it has.
     fields: Vec<usize>,
+    /// Lines of its fibres, behind the fields.
+    fibres: Vec<ToldFibres>,
+    /// Sharp edges of the tool and its rim, of two points each, behind these.
+    edges: usize,
 }
 
 #[derive(Debug, Serialize)]
@@ -119,27 +149,8 @@ struct ToldDefect {
     lines: Vec<usize>,
 }
 
-/// A mesh that may be shown.
-struct Body<'a> {
-    ply: Option<&'a Ply>,
-    zone: Option<&'a str>,
-    /// Places by which it is thinned: flat ones, where it has some.
-    at: &'a [Vec3],
-    formed: &'a [Vec3],
-    cells: Vec<Vec<u32>>,
-}
-
-impl Body<'_> {
-    fn name(&self) -> String {
-        let ply = self.ply.map_or("tool", |p| p.name.as_str());
-        match self.zone {
-            Some(zone) => format!("{ply} of zone {zone}"),
-            None => ply.to_owned(),
-        }
-    }
-}
-
-/// The scene of what is shown in one of `drawn` views on the page; `None` without formed plies.
+/// The scene of what is shown in one of `drawn` views on the page; `None` without formed plies. Long, as it writes all parts in the order in which
+/// the script of the page reads them.
 ///
 /// # Errors
 /// When the data cannot be packed.
@@ -151,36 +162,43 @@ pub(crate) fn scene(
     if shown.plies.is_empty() {
         return Ok(None);
     }
+    let way = Way {
+        frames: shown.frames,
+        plies: shown.plies,
+    };
     let of_page = |all: f64| (all * sharp.share()) as usize / drawn.max(1);
     let all = bodies(&shown);
-    let plies: Vec<&Ply> = all.iter().filter_map(|b| b.ply).collect();
-    let others = Others::of(&plies);
+    let own = all.iter().filter_map(|b| b.ply);
+    let others = Others::of(&own.chain(shown.beside.iter().copied()).collect::<Vec<_>>());
     let (bodies, most, mut notes) = chosen(all, of_page(POINTS));
     let places = shown.places;
-    let ends = (places.iter()).flat_map(|p| p.lines.iter().flat_map(|l| &l.formed));
-    let all = bodies.iter().flat_map(|b| b.formed).chain(ends);
-    let Some(extent) = Extent::of(all) else {
+    let Some(extent) = extent(&bodies, places, way) else {
         return Ok(None);
     };
     let thinned: Vec<Thinned> = (bodies.iter())
-        .map(|b| thin::thin(b.at, &b.cells, most))
+        .map(|b| thin::thin(b.at, &b.cells, most, b.ply.is_none()))
         .collect();
     let mut legends = shown.legends;
-    let room = of_page(ROOM);
-    let left_out = choose(&mut legends, others.legends, &bodies, &thinned, room)?;
+    let left_out = choose(
+        &mut legends,
+        others.legends,
+        &bodies,
+        &thinned,
+        of_page(ROOM),
+    )?;
     let mut stream = Stream::default();
-    let write = |(body, found): (&Body<'_>, &Thinned)| {
-        let inside = refined(body, &bodies, shown.zones);
-        write(&mut stream, &extent, (body, found), &inside, &legends)
-    };
-    let told: Vec<ToldBody> = bodies.iter().zip(&thinned).map(write).collect();
+    let apart = fibres::apart(&bodies, of_page(fibres::POINTS));
+    let pairs: Vec<_> = bodies.iter().zip(&thinned).collect();
+    let lines = (shown.zones, apart);
+    let told = meshes(&mut stream, &extent, &pairs, &legends, lines);
     notes.extend(bodies.iter().zip(&told).filter_map(coarser));
     let outlines = outlines(&mut stream, &extent, shown.plies, shown.zones);
     let defects = defects(&mut stream, &extent, places);
-    let plies = distinct(told.iter().filter_map(|b| b.ply.clone()));
-    let zones = distinct(told.iter().filter_map(|b| b.zone.clone()));
-    let tool = told.iter().any(|b| b.ply.is_none());
-    let elements = are_elements(&bodies, &told);
+    let most = of_page(way::POINTS);
+    let way = way.write(&mut stream, &extent, (&bodies, &thinned), &legends, most);
+    let times = way.as_ref().map_or(Vec::new(), |w| w.times.clone());
+    let coarse = way::exact(&extent);
+    let seen = Seen::of(&told, &bodies);
     let told = Told {
         extent,
         lift: shown.plies.iter().map(lift).fold(0.0, f64::max),
@@ -188,20 +206,58 @@ pub(crate) fn scene(
         bodies: told,
         outlines,
         defects,
+        way,
         data: stream.text()?,
     };
     Ok(Some(Scene {
         json: script_json(&told)?,
-        plies,
-        zones,
-        tool,
+        seen,
         notes,
-        elements,
         legends,
         even: others.even,
         left_out,
         defects: !places.is_empty(),
+        fibres: apart,
+        times,
+        coarse,
     }))
+}
+
+/// Writes all meshes with their fields, lines of fibres and edges. `lines`: the zones, and how far apart lines of fibres are (m).
+fn meshes(
+    stream: &mut Stream,
+    extent: &Extent,
+    pairs: &[(&Body<'_>, &Thinned)],
+    legends: &[Legend],
+    (zones, apart): (&[Zone], Option<f64>),
+) -> Vec<ToldBody> {
+    let mut all = Vec::new();
+    for (body, found) in pairs {
+        let inside = refined(body, pairs, zones);
+        let mut told = write(stream, extent, (body, found), &inside, legends);
+        told.fibres = fibres::write(stream, extent, body, &inside, apart);
+        told.edges = edges(stream, extent, body);
+        all.push(told);
+    }
+    all
+}
+
+/// The box of all that is shown, wherever it is on its way; `None` without a point.
+fn extent(bodies: &[Body<'_>], places: &[Place], way: Way<'_>) -> Option<Extent> {
+    let ends = (places.iter()).flat_map(|p| p.lines.iter().flat_map(|l| &l.formed));
+    let all = bodies.iter().flat_map(|b| b.formed).chain(ends);
+    Extent::of(all.chain(way.points()))
+}
+
+impl Seen {
+    fn of(told: &[ToldBody], bodies: &[Body<'_>]) -> Self {
+        Self {
+            plies: distinct(told.iter().filter_map(|b| b.ply.clone())),
+            zones: distinct(told.iter().filter_map(|b| b.zone.clone())),
+            tool: told.iter().any(|b| b.ply.is_none()),
+            elements: are_elements(bodies, told),
+        }
+    }
 }
 
 /// Whether the cells of all plies are those that were computed.
@@ -217,14 +273,18 @@ fn coarser((body, told): (&Body<'_>, &ToldBody)) -> Option<String> {
 }
 
 /// The zones in which a ply of the global run is there as a finer one, too.
-fn refined<'a>(body: &Body<'_>, bodies: &[Body<'_>], zones: &'a [Zone]) -> Vec<&'a Zone> {
+fn refined<'a>(
+    body: &Body<'_>,
+    pairs: &[(&Body<'_>, &Thinned)],
+    zones: &'a [Zone],
+) -> Vec<&'a Zone> {
     let (Some(ply), None) = (body.ply, body.zone) else {
         return Vec::new();
     };
     let is_finer = |b: &Body<'_>, zone: &Zone| {
         b.zone == Some(zone.name.as_str()) && b.ply.is_some_and(|p| p.name == ply.name)
     };
-    let has = |zone: &&Zone| bodies.iter().any(|b| is_finer(b, zone));
+    let has = |zone: &&Zone| pairs.iter().any(|(b, _)| is_finer(b, zone));
     zones.iter().filter(has).collect()
 }
 
@@ -355,7 +415,24 @@ fn write(
         points: found.points.len(),
         parts,
         fields,
+        fibres: Vec::new(),
+        edges: 0,
     }
+}
+
+/// Writes the sharp edges of a tool, as it was before it was thinned; gives their number. Of a tool that is rough everywhere there are none.
+fn edges(stream: &mut Stream, extent: &Extent, body: &Body<'_>) -> usize {
+    let mut all = match body.ply {
+        Some(_) => Vec::new(),
+        None => thin::sharp_edges(body.at, &body.cells),
+    };
+    if all.len() > EDGES {
+        all.clear();
+    }
+    for side in &all {
+        stream.points(extent, side.iter().map(|i| body.formed[*i as usize]));
+    }
+    all.len()
 }
 
 fn field(legend: &Legend) -> ToldField {

@@ -223,6 +223,41 @@ pub(crate) fn formed(
     })
 }
 
+/// The tool alone, from the front and above, with its size along x, y and z (m).
+///
+/// # Errors
+/// When the picture cannot be encoded.
+pub(crate) fn tool_picture(
+    tool: &Tool,
+    width: f64,
+    sharp: Sharpness,
+) -> Result<(Markup, Vec3), DrawError> {
+    let camera = Camera::oblique((-65f64).to_radians(), 38f64.to_radians());
+    let (camera, size) = fit(camera, &tool.points, &[], [width, 0.72 * width], sharp);
+    let mut canvas = Canvas::new(size);
+    let mesh = Triangles::new(tool.points.len(), &tool.cells);
+    canvas.surface(
+        &camera,
+        &Surface::new(&tool.points, &mesh, Paint::Plain(TOOL)).lit(0.0),
+    );
+    let image = canvas.data_url()?;
+    let [w, h] = size.map(|s| s as f64 / sharp.0);
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for p in &tool.points {
+        for d in 0..3 {
+            (low[d], high[d]) = (low[d].min(p[d]), high[d].max(p[d]));
+        }
+    }
+    let extent = [0, 1, 2].map(|d| (high[d] - low[d]).max(0.0));
+    let picture = html! {
+        svg viewBox={ "0 0 " (px(w)) " " (px(h)) } role="img" aria-label="The tool" {
+            image href=(image) x="0" y="0" width=(px(w)) height=(px(h)) {}
+            (triad(&camera, [34.0, h - 26.0]))
+        }
+    };
+    Ok((picture, extent))
+}
+
 /// A drawn view, for placing lines on what it shows.
 struct View<'a> {
     camera: Camera,

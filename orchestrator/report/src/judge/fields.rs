@@ -1,9 +1,10 @@
-//! Shear and fibre strain: in every cell of the finest run that has it.
+//! Shear, strain and deviation of fibres: in every cell of the finest run that has it.
 
 use super::evidence::Evidence;
 use super::governed::Governed;
 use crate::input::ReportInput;
 use crate::judged::{Finding, size};
+use crate::plain::PlyShape;
 use crate::read::{Material, Run, Study, last_frame, open, quads};
 use crate::units::{plural, quantity};
 use plyflow_artifact::{Artifact, On};
@@ -20,8 +21,12 @@ struct Sheet {
     shear: Option<Vec<f64>>,
     /// `[cells]` (1), of both families the larger by size; none where the run does not tell it.
     strain: Option<Vec<f64>>,
+    /// `[cells]` (rad), of both families the larger by size, NaN where it is not known; none where the run does not tell the fibres.
+    deviation: Option<Vec<f64>>,
     /// Undeformed area that has no shape (m2).
     undraped: f64,
+    /// Cells in which the deviation is not known: their middles in the flat ply (m) and their undeformed areas (m2).
+    steep: Vec<([f64; 2], f64)>,
 }
 
 /// A run with its cells.
@@ -71,6 +76,7 @@ impl<'a> Look<'a> {
             for ply in plies {
                 let (values, what) = match on {
                     LimitOn::FibreStrain => (&ply.strain, "strains of fibres"),
+                    LimitOn::FibreDeviation => (&ply.deviation, "directions of fibres"),
                     _ => (&ply.shear, "shear angles"),
                 };
                 let Some(values) = values else {
@@ -83,12 +89,33 @@ impl<'a> Look<'a> {
                     let text = format!("{area} of {} are not draped in {label}", ply.ply);
                     all.open.push(text);
                 }
+                let steep = self.steep(on, looked, ply);
+                if steep > 0.0 {
+                    all.open.push(format!(
+                        "{} of {} in {label} stand across the x axis, from which fibres are told, by more than 60 deg",
+                        quantity(steep, "m2", 3),
+                        ply.ply
+                    ));
+                }
                 all.findings
                     .extend(self.worst(on, looked, ply, values, governed));
             }
         }
         all.by = self.by();
         all
+    }
+
+    /// Undeformed area of a ply in which no deviation of fibres is known (m2), without that in which a finer run has looked.
+    fn steep(&self, on: LimitOn, looked: &Looked<'_>, ply: &Sheet) -> f64 {
+        let asked = |_: &&([f64; 2], f64)| on == LimitOn::FibreDeviation;
+        let own = |(at, _): &&([f64; 2], f64)| !self.has_finer(looked, at);
+        let cells = ply.steep.iter().filter(asked).filter(own);
+        cells.map(|(_, area)| area).sum()
+    }
+
+    /// Whether a finer run has looked at a place of the flat ply (m).
+    fn has_finer(&self, looked: &Looked<'_>, at: &[f64; 2]) -> bool {
+        looked.zone.is_none() && self.zones.iter().any(|z| z.holds(at, 0.0))
     }
 
     /// The worst cell of a ply at each place of the limits, of those in which no finer run has looked.
@@ -101,8 +128,9 @@ impl<'a> Look<'a> {
         governed: &Governed<'_>,
     ) -> Vec<Finding> {
         let mut worst: BTreeMap<Option<usize>, (f64, [f64; 2])> = BTreeMap::new();
-        for (value, at) in values.iter().zip(&ply.at) {
-            let finer = looked.zone.is_none() && self.zones.iter().any(|z| z.holds(at, 0.0));
+        let known = |(value, _): &(&f64, _)| value.is_finite();
+        for (value, at) in values.iter().zip(&ply.at).filter(known) {
+            let finer = self.has_finer(looked, at);
             let Some(place) = governed.place_at(on, &ply.ply, *at).filter(|_| !finer) else {
                 continue;
             };
@@ -149,10 +177,11 @@ fn sheets(input: &ReportInput, run: &Run) -> Result<Vec<Sheet>, String> {
     let path = &input.instances[run.instance].artifact;
     let artifact = open(path).map_err(|e| e.to_string())?;
     let plies = run.facts.plies();
-    plies.map(|p| sheet(&artifact, &p.name)).collect()
+    plies.map(|p| sheet(&artifact, p)).collect()
 }
 
-fn sheet(artifact: &Artifact, name: &str) -> Result<Sheet, String> {
+fn sheet(artifact: &Artifact, told: &plyflow_model::artifact::Sheet) -> Result<Sheet, String> {
+    let name = told.name.as_str();
     let said = |e: &dyn std::fmt::Display| e.to_string();
     let frame = last_frame(artifact).map_err(|e| said(&e))?;
     let body = artifact.body(name).map_err(|e| said(&e))?;
@@ -184,11 +213,20 @@ fn sheet(artifact: &Artifact, name: &str) -> Result<Sheet, String> {
         0.5 * (e[0] * f[1] - e[1] * f[0]).abs()
     };
     let bare = |i: &usize| draped.as_ref().is_some_and(|d| d[*i] <= 0.5);
+    let formed = artifact.frame_points(name, frame).map_err(|e| said(&e))?;
+    let shape = PlyShape::of((&flat, &formed), &cells, None, (told.fibres(), None));
+    let deviation = shape.larger_deviation().map(of_kept);
+    let unknown = |d: &Vec<f64>| -> Vec<([f64; 2], f64)> {
+        let cells = kept.iter().zip(d).filter(|(_, d)| d.is_nan());
+        cells.map(|(i, _)| (middle(i), area(*i))).collect()
+    };
     Ok(Sheet {
         ply: name.to_owned(),
         at: kept.iter().map(middle).collect(),
         shear: field("shear_angle").map(of_kept),
         strain: strain.map(of_kept),
+        steep: deviation.as_ref().map(unknown).unwrap_or_default(),
+        deviation,
         undraped: (0..cells.len()).filter(bare).map(area).sum(),
     })
 }

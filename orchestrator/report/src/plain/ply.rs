@@ -1,5 +1,7 @@
 //! Meshes of plies and tool, with what is known at their points and in their cells.
 
+use crate::plain::shape::Shape;
+
 /// A place or a direction in space.
 pub(crate) type Vec3 = [f64; 3];
 
@@ -64,6 +66,14 @@ pub(crate) struct Ply {
     pub(crate) marked: Vec<Marked>,
     /// Whatever else is told of its points and cells.
     pub(crate) others: Vec<Other>,
+    /// Cells that a drape has reached; absent: all.
+    pub(crate) draped: Option<Vec<bool>>,
+    /// Directions of both fibre families in the flat ply (rad, from x).
+    pub(crate) fibres: Option<[f64; 2]>,
+    /// Thickness of the flat ply (m).
+    pub(crate) thickness: Option<f64>,
+    /// What follows from flat and formed shape.
+    pub(crate) shape: Shape,
 }
 
 /// A scalar field on the points of a ply.

@@ -8,7 +8,7 @@ use crate::read::facts::Facts;
 use crate::read::history::History;
 use crate::read::links::Links;
 use crate::read::study::{Local, Run, Study};
-use crate::read::{measured, others, plies};
+use crate::read::{frames, measured, others, plies};
 use camino::Utf8Path;
 use plyflow_model::artifact::{
     Attributes, ComparedBody, Defects, Forming, Measurement, Zones, current_zones,
@@ -252,12 +252,20 @@ impl<'a> Reader<'a> {
             let told = study.global.as_ref().map_or(&unread, |g| &g.facts);
             let plies = plies::formed_plies(path, told);
             study.plies = self.noted(plan.global, plies).unwrap_or_default();
+            study.laid();
+            study.frames = self
+                .noted(plan.global, frames::read(path, &study.plies))
+                .flatten();
             return;
         };
         let plies = self.noted(at, plies::judged_plies(self.path(at)));
         let plies = plies.into_iter().flatten();
         study.plies = plies.map(|(_, ply)| ply).collect();
         self.noted(plan.global, others::add(path, &mut study.plies));
+        study.laid();
+        study.frames = self
+            .noted(plan.global, frames::read(path, &study.plies))
+            .flatten();
     }
 
     fn read_locals(&mut self, study: &mut Study, runs: &[usize], comparison: Option<usize>) {
@@ -282,6 +290,9 @@ impl<'a> Reader<'a> {
                 plies = self.noted(at, read).unwrap_or_default();
             } else if self.pictures {
                 self.noted(at, others::add(self.path(at), &mut plies));
+            }
+            for ply in &mut plies {
+                ply.laid_as(&run.facts.sheets);
             }
             study.locals.push(Local { zone, run, plies });
         }

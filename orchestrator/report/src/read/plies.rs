@@ -71,11 +71,20 @@ pub(crate) fn judged_plies(path: &Utf8Path) -> Result<Vec<(Option<ComparedBody>,
             deflection: None,
             marked,
             others: others::of_body(&artifact, body, frame, &cells),
+            draped: draped(&artifact, &body.name, frame, cells.len()),
             cells,
+            ..Ply::default()
         };
         all.push((about, ply));
     }
     Ok(all)
+}
+
+/// Which cells a drape has reached; `None` of an artifact that does not tell.
+fn draped(artifact: &Artifact, body: &str, frame: u64, cells: usize) -> Option<Vec<bool>> {
+    let told = artifact.frame_field(body, frame, On::Cells, "draped").ok();
+    let told = told.filter(|d| d.len() == cells)?;
+    Some(told.iter().map(|d| *d > 0.5).collect())
 }
 
 /// Plies of a `forming` artifact in the order of the stack, in its last frame.
@@ -95,6 +104,7 @@ pub(crate) fn formed_plies(path: &Utf8Path, told: &Forming) -> Result<Vec<Ply>, 
                 .ok(),
             marked: vec![Marked::No; cells.len()],
             others: others::of_body(&artifact, body, frame, &cells),
+            draped: draped(&artifact, name, frame, cells.len()),
             cells,
             ..Ply::default()
         })

@@ -1,6 +1,6 @@
 //! A global run with what it led to: its defects and zones, its local runs, their comparison.
 
-use crate::plain::{Place, Ply, Tool};
+use crate::plain::{Frames, Place, Ply, Tool};
 use crate::read::comparison::Comparison;
 use crate::read::history::History;
 use plyflow_model::artifact::{Confirmation, Defects, Forming, Zone};
@@ -16,6 +16,8 @@ pub(crate) struct Study {
     pub(crate) tool: Option<Tool>,
     /// Its plies, formed, with what the detection found.
     pub(crate) plies: Vec<Ply>,
+    /// Its plies on their way, where the run has kept frames.
+    pub(crate) frames: Option<Frames>,
     /// What the detection tells of itself; absent without one.
     pub(crate) detection: Option<Defects>,
     /// The instance of the detection.
@@ -69,6 +71,14 @@ impl Study {
     pub(crate) fn all_plies(&self) -> Vec<&Ply> {
         let locals = self.locals.iter().flat_map(|l| &l.plies);
         self.plies.iter().chain(locals).collect()
+    }
+
+    /// Takes over for the plies of the global run what that tells of the flat ones.
+    pub(crate) fn laid(&mut self) {
+        let sheets = self.global.as_ref().map(|g| g.facts.sheets.as_slice());
+        for ply in &mut self.plies {
+            ply.laid_as(sheets.unwrap_or_default());
+        }
     }
 
     /// Its runs: the global one, the local ones, and the reference, which may be one of them.

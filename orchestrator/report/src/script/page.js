@@ -34,6 +34,7 @@
       select(row.dataset.defect, row);
     });
   }
+  document.addEventListener('plyflow-nothing', () => select(null));
   document.addEventListener('keydown', (event) => {
     if (event.key === 'Escape' && selected !== null) select(null);
   });

@@ -3,6 +3,8 @@
 'use strict';
 const Scene3d = (() => {
   const TOOL = [0.5, 0.53, 0.57];
+  // Of a ply where nothing is known.
+  const UNKNOWN = [0.72, 0.72, 0.72];
 
   async function inflated(text) {
     const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
@@ -26,14 +28,23 @@ const Scene3d = (() => {
     const take = reader(buffer);
     const { low, size } = told.extent;
     const points = (n) => Float32Array.from(take(Uint16Array, 3 * n, 3), (v, i) => low[i % 3] + (v / 65535) * size[i % 3]);
+    const lines = (list) => list.map((one) => ({ ...one, lines: one.lines.map(points) }));
+    const shades = (fields, n) => new Map(fields.map((k) => [k, take(Uint8Array, n, 1)]));
     const bodies = told.bodies.map((body) => {
       const position = points(body.points);
       const parts = body.parts.map((part) => ({ zone: part.zone, quads: take(Uint32Array, 4 * part.cells, 4) }));
-      const fields = new Map(body.fields.map((k) => [k, take(Uint8Array, body.points, 1)]));
-      return { ...body, position, parts, fields };
+      const fields = shades(body.fields, body.points);
+      return { ...body, position, parts, fields, fibres: lines(body.fibres), edges: Array.from({ length: body.edges }, () => points(2)), moments: [] };
     });
-    const lines = (list) => list.map((one) => ({ ...one, lines: one.lines.map(points) }));
-    return { ...told, bodies, outlines: lines(told.outlines), defects: lines(told.defects) };
+    const [outlines, defects] = [lines(told.outlines), lines(told.defects)];
+    const { way } = told;
+    // The moments before the last: places are coarser, and there are those of the plies of the whole alone.
+    const step = way ? Math.max(...size) / way.places : 0;
+    const coarse = (n) => Float32Array.from(take(Uint16Array, 3 * n, 3), (v, i) => low[i % 3] + v * step);
+    for (let k = 0; way && k + 1 < way.times.length; k++) {
+      for (const b of way.bodies) bodies[b].moments.push({ position: coarse(bodies[b].points), fields: shades(way.fields, bodies[b].points) });
+    }
+    return { ...told, bodies, outlines, defects };
   }
 
   function triangles(quads) {
@@ -140,29 +151,32 @@ const Scene3d = (() => {
         attribute vec3 position, normal;
         attribute float place;
         varying vec3 face;
-        varying float at;
-        void main() { face = normal; at = place; gl_Position = project(position); }`,
+        varying float at, known;
+        uniform vec3 moved;
+        // 0 stands for no value, 1 to 255 for places on the scale.
+        void main() { face = normal; at = (place * 255.0 - 1.0) / 254.0; known = min(place * 255.0, 1.0); gl_Position = project(position + moved); }`,
       frag: `
         precision highp float;
         uniform sampler2D colours;
         uniform vec3 right, up, towards, plain;
         uniform bool coloured;
         varying vec3 face;
-        varying float at;
+        varying float at, known;
         void main() {
           vec3 n = normalize(face);
           if (dot(n, towards) < 0.0) n = -n;
           float light = max(0.0, dot(n, normalize(-0.45 * right + 0.55 * up + 0.7 * towards)));
-          vec3 colour = coloured ? texture2D(colours, vec2(at * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb : plain;
+          bool shaded = coloured && known > 0.99;
+          vec3 colour = shaded ? texture2D(colours, vec2(at * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb : plain;
           // Colours that stand for values keep most of their lightness.
-          gl_FragColor = vec4(colour * mix(coloured ? 0.75 : 0.56, 1.0, light), 1.0);
+          gl_FragColor = vec4(colour * mix(shaded ? 0.75 : 0.56, 1.0, light), 1.0);
         }`,
       attributes: {
         position: regl.prop('position'),
         normal: regl.prop('normal'),
         place: (_, { place }) => (place ? { buffer: place, normalized: true } : { constant: 0 }),
       },
-      uniforms: { ...camera, colours: regl.prop('colours'), coloured: regl.prop('coloured'), plain: TOOL, lift: regl.prop('lift') },
+      uniforms: { ...camera, colours: regl.prop('colours'), coloured: regl.prop('coloured'), plain: regl.prop('plain'), moved: regl.prop('moved'), lift: regl.prop('lift') },
       elements: regl.prop('elements'),
     });
     const line = regl({
@@ -170,9 +184,10 @@ const Scene3d = (() => {
         attribute vec3 from, to;
         attribute vec2 corner;
         uniform vec2 pixel;
+        uniform vec3 moved;
         uniform float width;
         void main() {
-          vec4 a = project(from), b = project(to);
+          vec4 a = project(from + moved), b = project(to + moved);
           vec2 along = (b.xy - a.xy) / pixel;
           along = length(along) > 0.0 ? normalize(along) : vec2(1.0, 0.0);
           vec2 off = along * (corner.x * 2.0 - 1.0) + vec2(-along.y, along.x) * corner.y;
@@ -180,7 +195,7 @@ const Scene3d = (() => {
         }`,
       frag: 'precision highp float; uniform vec4 colour; void main() { gl_FragColor = vec4(colour.rgb * colour.a, colour.a); }',
       attributes: { from: regl.prop('from'), to: regl.prop('to'), corner: regl.prop('corner') },
-      uniforms: { ...camera, width: regl.prop('width'), colour: regl.prop('colour'), lift: regl.prop('lift') },
+      uniforms: { ...camera, width: regl.prop('width'), colour: regl.prop('colour'), moved: (_, { moved }) => moved ?? [0, 0, 0], lift: regl.prop('lift') },
       elements: regl.prop('elements'),
       depth: { enable: regl.prop('hide') },
       blend: { enable: true, func: { src: 'one', dst: 'one minus src alpha' } },
@@ -217,18 +232,22 @@ const Scene3d = (() => {
       let [points, normal] = [body.position, null];
       // What has no field may have points more than once.
       if (!body.ply && !body.fields.size) ({ points, normal, parts } = creased(points, parts));
+      const whole = body.parts.map((p) => ({ triangles: triangles(p.quads) }));
+      const drawn = (pairs, position) => ribbon(pairs.map((pair) => Float32Array.from(pair.flatMap((i) => [...position.subarray(3 * i, 3 * i + 3)]))));
+      const rim = (position) => once(() => drawn(sides(body.parts.map((p) => p.quads), body.points, true), position));
       return {
         ...body,
-        normal: regl.buffer(normal ?? normals(points, parts)),
-        position: regl.buffer(points),
-        // Made when they are asked for: most readers look at the surface alone.
-        rim: once(() => ribbon(sides(parts.map((p) => p.quads), body.points, true).map((pair) => Float32Array.from(pair.flatMap((i) => [...body.position.subarray(3 * i, 3 * i + 3)]))))),
+        plain: body.ply ? UNKNOWN : TOOL,
+        // Where it is at the end. Made when they are asked for: most readers look at the surface alone.
+        end: { normal: regl.buffer(normal ?? normals(points, parts)), position: regl.buffer(points), fields: new Map([...body.fields].map(([k, values]) => [k, regl.buffer(values)])), rim: rim(body.position) },
+        moments: body.moments.map((m) => once(() => ({ normal: regl.buffer(normals(m.position, whole)), position: regl.buffer(m.position), fields: new Map([...m.fields].map(([k, values]) => [k, regl.buffer(values)])), rim: rim(m.position) }))),
+        edges: once(() => ribbon(body.edges)),
+        fibres: body.fibres.map((f) => ({ family: f.family, zone: f.zone, ribbon: once(() => ribbon(f.lines)) })),
         parts: parts.map((p) => ({
           zone: p.zone,
           elements: regl.elements({ data: p.triangles, type: 'uint32' }),
           mesh: once(() => regl.elements({ primitive: 'lines', data: sides([p.quads], body.points, false), type: 'uint32' })),
         })),
-        fields: new Map([...body.fields].map(([k, values]) => [k, regl.buffer(values)])),
       };
     });
     const ribbons = (list) => list.map((one) => ({ ...one, ribbon: ribbon(one.lines) })).filter((one) => one.ribbon.from.length);

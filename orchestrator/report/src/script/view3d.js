@@ -3,6 +3,8 @@
 (() => {
   const HOME = { azimuth: -50, elevation: 35 };
   const PICK = [0.86, 0, 0.55];
+  // Of the fibre families: told apart on every scale, and from the lines of zones by their width.
+  const FIBRES = [[0.05, 0.05, 0.05], [0.0, 0.36, 0.16]];
   const rad = (degrees) => (degrees * Math.PI) / 180;
   const deg = (angle) => (angle * 180) / Math.PI;
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -10,32 +12,40 @@
 
   class View {
     constructor(element, canvas, told, { regl, data, paint, scene }) {
-      Object.assign(this, { element, canvas, told, regl, paint, scene });
-      this.plies = data.bodies.filter((b) => b.ply && !b.zone);
+      Object.assign(this, { element, canvas, told, regl, data, paint, scene });
       this.radius = Math.hypot(...told.extent.size) / 2;
-      this.show = { tool: true, mesh: false, edges: false, ply: new Set(), zone: new Set(), field: 0, defect: null };
+      this.last = told.way ? told.way.times.length - 1 : 0;
+      this.show = { tool: true, mesh: false, edges: false, fibres: new Set(), ply: new Set(), zone: new Set(), field: 0, defect: null, moment: this.last };
       this.waiting = false;
+      this.linked = [];
     }
 
     // ---- camera: where the eye is, what it looks at, and half the height (m) that it sees ----
 
-    // The plies fill the view; the tool may reach out of it.
+    // Plies and tool fill the view, wherever they are on their way.
     home(towards = HOME) {
-      const mean = [0, 0, 0], reach = [0, 0];
-      let count = 0;
-      for (const { position } of this.plies) {
-        for (let i = 0; i < position.length; i += 3, count++) for (let d = 0; d < 3; d++) mean[d] += position[i + d];
-      }
-      this.eye = { ...towards, target: mean.map((m) => m / count) };
+      const low = [Infinity, Infinity], high = [-Infinity, -Infinity], mean = [0, 0, 0];
+      this.eye = { ...towards, target: mean };
       const { right, up } = this.axes();
-      for (const { position } of this.plies) {
-        for (let i = 0; i < position.length; i += 3) {
-          const q = this.eye.target.map((t, d) => position[i + d] - t);
-          [right, up].forEach((axis, k) => { reach[k] = Math.max(reach[k], Math.abs(dot(q, axis))); });
+      const all = this.data.bodies.filter((b) => !b.zone).flatMap((b) => [b.position, ...b.moments.slice(0, 1).map((m) => m.position)]);
+      let count = 0;
+      for (const position of all) {
+        for (let i = 0; i < position.length; i += 3, count++) {
+          const p = position.subarray(i, i + 3);
+          p.forEach((v, d) => { mean[d] += v; });
+          [right, up].forEach((axis, k) => {
+            const at = dot(p, axis);
+            low[k] = Math.min(low[k], at);
+            high[k] = Math.max(high[k], at);
+          });
         }
       }
+      const middle = mean.map((m) => m / count);
+      const off = [right, up].map((axis, k) => (low[k] + high[k]) / 2 - dot(middle, axis));
+      this.eye.target = middle.map((m, d) => m + off[0] * right[d] + off[1] * up[d]);
       const { clientWidth, clientHeight } = this.canvas;
-      this.eye.half = 1.08 * Math.max(reach[1], (reach[0] * clientHeight) / Math.max(clientWidth, 1));
+      const [wide, tall] = [0, 1].map((k) => (high[k] - low[k]) / 2);
+      this.eye.half = 1.06 * Math.max(tall, (wide * clientHeight) / Math.max(clientWidth, 1));
       this.later();
     }
 
@@ -63,6 +73,22 @@
       this.later();
     }
 
+    // Shows a moment of the way, the last one with the finer plies of zones.
+    at(moment) {
+      this.show.moment = moment;
+      const slider = this.element.querySelector('input[data-moment]');
+      if (slider) {
+        slider.value = moment;
+        this.element.querySelector('output').textContent = `${Math.round(1000 * this.told.way.times[moment])} ms`;
+        slider.setAttribute('aria-valuetext', this.element.querySelector('output').textContent);
+      }
+      this.later();
+    }
+
+    ended() {
+      return this.show.moment === this.last;
+    }
+
     chosen() {
       return this.scene.defects.find((d) => d.id === this.show.defect);
     }
@@ -71,6 +97,7 @@
       this.show.defect = id;
       const defect = this.chosen();
       if (defect) {
+        this.at(this.last);
         const [x, y, z] = defect.normal;
         const far = defect.lines.flatMap((l) => [...l]).reduce((m, v, i) => Math.max(m, Math.abs(v - defect.at[i % 3])), 0);
         this.eye = {
@@ -90,6 +117,15 @@
     later() {
       if (!this.waiting) requestAnimationFrame(() => this.draw());
       this.waiting = true;
+      for (const other of this.linked) other.follow(this);
+    }
+
+    // Of two runs side by side: another view looks from where this one does.
+    follow(other) {
+      const same = JSON.stringify(this.eye) === JSON.stringify(other.eye);
+      if (same) return;
+      this.eye = { ...other.eye, target: other.eye.target.slice() };
+      this.later();
     }
 
     // A chosen defect is seen on its own ply, as fine as it was found, whatever lies over it.
@@ -99,7 +135,7 @@
     }
 
     showsZone(zone) {
-      return this.show.zone.has(zone) || (zone !== null && this.chosen()?.zone === zone);
+      return this.ended() && (this.show.zone.has(zone) || (zone !== null && this.chosen()?.zone === zone));
     }
 
     visible(body) {
@@ -121,18 +157,28 @@
       const camera = { ...this.axes(), target: eye.target, depth: 4 * radius, scale, pixel: [2 / w, 2 / h] };
       this.regl.clear({ color: [0, 0, 0, 0], depth: 1 });
       this.paint.within(camera, () => {
+        const tool = this.ended() ? [0, 0, 0] : this.told.way.tool[show.moment];
         for (const body of scene.bodies.filter((b) => this.visible(b))) {
-          const place = body.fields.get(show.field);
+          const now = this.ended() || !body.ply ? body.end : body.moments[show.moment]();
+          const place = now.fields.get(show.field);
           // Where both are drawn, at the rim of a zone, the finer ply is seen.
           const lift = body.ply ? this.told.lift + (body.zone ? 0.0008 : 0) : 0;
-          const how = { place, coloured: Boolean(place), colours: scene.stripes[show.field], lift };
+          const moved = body.ply ? [0, 0, 0] : tool;
+          const how = { place, coloured: Boolean(place), colours: scene.stripes[show.field], plain: body.plain, moved, lift };
           const parts = body.parts.filter((p) => !this.showsZone(p.zone));
-          for (const part of parts) this.paint.surface({ ...body, ...part, ...how });
-          if (!body.ply) continue;
-          const over = { position: body.position, colour: [0, 0, 0, 0.45], lift: lift + 0.0006 };
+          for (const part of parts) this.paint.surface({ ...now, ...part, ...how });
+          if (!body.ply) {
+            if (body.edges().from.length) this.paint.line({ ...body.edges(), width: 1.2, colour: [0.1, 0.12, 0.14, 0.8], hide: true, moved, lift: lift + 0.0004 });
+            continue;
+          }
+          const over = { position: now.position, colour: [0, 0, 0, 0.45], lift: lift + 0.0006 };
           if (show.mesh) for (const part of parts) this.paint.wire({ ...over, elements: part.mesh() });
+          for (const f of this.ended() ? body.fibres : []) {
+            if (!show.fibres.has(String(f.family)) || this.showsZone(f.zone)) continue;
+            this.paint.line({ ...f.ribbon(), width: 1.1, colour: [...FIBRES[f.family], 0.85], hide: true, lift: lift + 0.0008 });
+          }
           // The finer ply of a zone ends at the zone's cut, which is no edge of the ply.
-          if (show.edges && !body.zone) this.paint.line({ ...body.rim(), width: 1.8, colour: [0, 0, 0, 1], hide: true, lift: lift + 0.001 });
+          if (show.edges && !body.zone) this.paint.line({ ...now.rim(), width: 1.8, colour: [0, 0, 0, 1], hide: true, lift: lift + 0.001 });
         }
         for (const outline of this.outlines()) this.stroke(outline.ribbon, 1.2, [0, 0, 0], 0.15);
         if (this.chosen()) this.stroke(this.chosen().ribbon, 3, PICK, 0.6);
@@ -144,7 +190,7 @@
 
     // Of all zones, on the uppermost ply of theirs that is shown.
     outlines() {
-      const shown = this.scene.outlines.filter((o) => this.showsPly(o.ply));
+      const shown = this.scene.outlines.filter((o) => this.ended() && this.showsPly(o.ply));
       const tops = new Map(shown.map((o) => [o.zone, o]));
       return shown.filter((o) => tops.get(o.zone) === o);
     }
@@ -203,6 +249,13 @@
       box.addEventListener('change', change);
       change();
     }
+    const slider = element.querySelector('input[data-moment]');
+    slider?.addEventListener('input', () => {
+      // A defect is one of the formed plies.
+      if (view.show.defect !== null && Number(slider.value) !== view.last) document.dispatchEvent(new CustomEvent('plyflow-nothing'));
+      view.at(Number(slider.value));
+    });
+    if (slider) view.at(view.last);
     element.querySelector('select')?.addEventListener('change', ({ target }) => {
       show.field = Number(target.value);
       for (const bar of element.querySelectorAll('.legend3d')) bar.hidden = bar.dataset.field !== target.value;
@@ -278,15 +331,58 @@
     pointers(view);
     document.addEventListener('plyflow-defect', ({ detail }) => view.select(detail.id, detail.scroll));
     new ResizeObserver(() => view.later()).observe(canvas);
+    return view;
   }
 
+  // Controls that mean the same in two views: by their names for people, as either may lack some.
+  const named = (control) => (control.type === 'checkbox' ? `${control.dataset.show} ${control.value}` : control.tagName + control.type);
+
+  function link(views) {
+    // One home for both.
+    views[1].home = (towards) => views[0].home(towards);
+    views.forEach((view, k) => {
+      const other = views[1 - k];
+      view.linked = [other];
+      const controls = (v) => [...v.element.querySelectorAll('input, select')];
+      for (const control of controls(view)) {
+        control.addEventListener(control.type === 'range' ? 'input' : 'change', () => {
+          const twin = controls(other).find((c) => named(c) === named(control));
+          if (!twin) return;
+          if (control.type === 'checkbox') {
+            if (twin.checked === control.checked) return;
+            twin.checked = control.checked;
+          } else if (control.type === 'range') {
+            const at = Math.round((control.value / control.max) * twin.max);
+            if (Number(twin.value) !== at) other.at(at);
+            return;
+          } else {
+            const text = control.selectedOptions[0].textContent;
+            const option = [...twin.options].find((o) => o.textContent === text);
+            if (!option || twin.value === option.value) return;
+            twin.value = option.value;
+          }
+          twin.dispatchEvent(new Event('change'));
+        });
+      }
+    });
+    views[0].home();
+  }
+
+  const started = [];
   for (const script of document.querySelectorAll('script.scene')) {
     const section = script.parentElement;
-    start(section).catch((error) => {
+    started.push(start(section).catch((error) => {
       section.querySelector('.view3d').hidden = true;
       const text = section.querySelector('.without-3d');
       text.hidden = false;
       text.append(` (${error.message})`);
+      return null;
+    }));
+  }
+  // Views come in pairs, those of A and of B.
+  if (document.body.classList.contains('beside')) {
+    Promise.all(started).then((views) => {
+      for (let k = 0; k + 1 < views.length; k += 2) if (views[k] && views[k + 1]) link([views[k], views[k + 1]]);
     });
   }
 })();

@@ -14,6 +14,27 @@ use plyflow_model::job::{Cost, NamedResult, Record};
 use plyflow_report::{Expectation, Instance, ReportInput};
 use serde_json::{Value, json};
 use shapes::{HALF, RADIUS, plies, sheet, tool};
+use std::f64::consts::FRAC_PI_4;
+
+/// A scene as artifacts have it: resolved, with its materials.
+pub fn scene() -> Value {
+    let fabric = json!({"plyflow_material": 1, "name": "Made-up fabric", "source": "nobody <knows>", "plugin": "material-fabric",
+        "thickness": "0.0004 m", "areal_mass": "0.44 kg/m2",
+        "with": {"fibre_modulus": 3e9, "shear": {"coefficients": [0.0, 112.0, 94.0]}, "bending": {"positive": {"stiffness": 4e-4}}}});
+    let film = json!({"plyflow_material": 1, "name": "Another law", "plugin": "somebody-s", "thickness": "8e-5 m", "areal_mass": "0.08 kg/m2",
+        "with": {"modulus": 12.5}});
+    let sheet =
+        |name: &str, material: &Value| json!({"name": name, "kind": "ply", "material": material});
+    json!({
+        "plyflow_scene": 1, "name": "half-pipe",
+        "tool": {"hemisphere": {"radius": "0.06 m", "facet_size": "0.004 m"}},
+        "sheets": [sheet("ply_1", &fabric), sheet("ply_2", &film)],
+        "friction": {"fabric_fabric": 0.35, "tool_fabric": {"coefficient": 0.2, "pressure": {"power": {"reference": "10000 Pa", "exponent": -0.1}}}},
+        "process": {"double_diaphragm": {"bag_pressure": "100000 Pa", "bagging_time": "0.08 s", "clearance": "0.005 m", "drawing_time": "0.4 s",
+            "film_joint_margin": "0.03 m", "film_pre_stretch": 0.01, "forming_pressure": "90000 Pa", "frame_length": "1.8 m", "frame_width": "1.5 m",
+            "lowering_time": "0.3 s", "settling_time": "0.04 s"}},
+    })
+}
 
 pub struct Study {
     pub folder: Utf8PathBuf,
@@ -22,6 +43,8 @@ pub struct Study {
     pub kinetic_bound_kept: bool,
     /// Whether they are of a press.
     pub press: bool,
+    /// The scene that they had; null: an artifact that tells none.
+    pub scene: Value,
 }
 
 impl Study {
@@ -31,6 +54,7 @@ impl Study {
             instances: Vec::new(),
             kinetic_bound_kept: true,
             press: false,
+            scene: scene(),
         }
     }
 
@@ -52,7 +76,10 @@ impl Study {
         let wires: Vec<Value> = (inputs.iter())
             .map(|(port, from)| json!({"port": port, "step": from, "item": [], "key": key(from)}))
             .collect();
-        let parameters = json!({"kinetic_bound": 0.05, "note": "a < b & \"c\""});
+        let mut parameters = json!({"kinetic_bound": 0.05, "note": "a < b & \"c\""});
+        if kind == "forming" && !self.scene.is_null() {
+            parameters["scene"] = self.scene.clone();
+        }
         let plugin = json!({"name": kind, "version": "0.1.0", "hash": "feed".repeat(16)});
         let bytes = w.finish(&json!({
             "step": step, "plugin": plugin, "components": [plugin], "parameters": parameters, "inputs": wires,
@@ -131,7 +158,11 @@ impl Study {
         let zone_json = zone.map_or(Value::Null, |(name, b)| json!({"name": name, "box": b, "free_sides": [false, false, name == "A", false]}));
         let list: Vec<Value> = sheets
             .iter()
-            .map(|(n, _)| json!({"name": n, "kind": "ply", "thickness": 0.0004, "offset": 0.001}))
+            .map(|(n, _)| {
+                let [x, y] = HALF;
+                json!({"name": n, "kind": "ply", "thickness": 0.0004, "offset": 0.001, "material": "Made-up fabric", "areal_mass": 0.44,
+                    "fibre_1": -FRAC_PI_4, "fibre_2": FRAC_PI_4, "outline": [[-x, -y], [x, -y], [x, y], [-x, y]]})
+            })
             .collect();
         let attributes = json!({
             "scene": "half-pipe", "sheets": list, "element_size": size, "zone": zone_json, "cycles": 40000,

@@ -4,7 +4,7 @@ use camino::Utf8PathBuf;
 use clap::Args;
 
 /// Where things are.
-#[derive(Debug, Args, Default)]
+#[derive(Debug, Clone, Args, Default)]
 pub struct Places {
     /// Folder for artifacts and journals [default: .plyflow beside the workflow]
     #[arg(long, value_name = "DIR")]

@@ -82,6 +82,11 @@ pub struct LimitValues {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0, "maximum" = 1))]
     pub fibre_strain: Option<f64>,
+    /// Largest angle between the fibres of the formed ply and the direction in which they were laid, of either family and sign. On the formed ply
+    /// that direction counts as on the flat one: from the x axis, which is projected onto the ply.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-minimum" = "0 deg"))]
+    pub fibre_deviation: Option<Angle>,
 }
 
 /// What a limit is about.
@@ -103,11 +108,13 @@ pub enum LimitOn {
     ShearNegative,
     /// Strain of fibres of either sign (1).
     FibreStrain,
+    /// Angle of formed fibres to the direction as laid, of either family and sign (rad).
+    FibreDeviation,
 }
 
 impl LimitOn {
     /// All, in the order in which they are told.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::WrinkleHeight,
         Self::WrinkleLength,
         Self::BridgingGap,
@@ -116,6 +123,7 @@ impl LimitOn {
         Self::ShearPositive,
         Self::ShearNegative,
         Self::FibreStrain,
+        Self::FibreDeviation,
     ];
 
     /// Its key in a workflow.
@@ -129,6 +137,7 @@ impl LimitOn {
             Self::ShearPositive => "shear_positive",
             Self::ShearNegative => "shear_negative",
             Self::FibreStrain => "fibre_strain",
+            Self::FibreDeviation => "fibre_deviation",
         }
     }
 
@@ -143,6 +152,7 @@ impl LimitOn {
             Self::ShearPositive => "positive shear angle",
             Self::ShearNegative => "negative shear angle",
             Self::FibreStrain => "fibre strain",
+            Self::FibreDeviation => "fibre deviation",
         }
     }
 
@@ -151,7 +161,7 @@ impl LimitOn {
         match self {
             Self::WrinkleHeight | Self::WrinkleLength | Self::BridgingGap => "m",
             Self::BridgingArea => "m2",
-            Self::Shear | Self::ShearPositive | Self::ShearNegative => "rad",
+            Self::Shear | Self::ShearPositive | Self::ShearNegative | Self::FibreDeviation => "rad",
             Self::FibreStrain => "1",
         }
     }
@@ -169,6 +179,7 @@ impl LimitValues {
             LimitOn::ShearPositive => self.shear_positive.map(Angle::si),
             LimitOn::ShearNegative => self.shear_negative.map(Angle::si),
             LimitOn::FibreStrain => self.fibre_strain,
+            LimitOn::FibreDeviation => self.fibre_deviation.map(Angle::si),
         }
     }
 
@@ -242,7 +253,7 @@ mod tests {
     #[test]
     fn limits_are_read_with_their_units_and_told_again_the_same() {
         let limits = read(json!({
-            "wrinkle_height": "0.5 mm", "bridging_area": "2 cm2", "shear_negative": "-50 deg", "fibre_strain": 0.01,
+            "wrinkle_height": "0.5 mm", "bridging_area": "2 cm2", "shear_negative": "-50 deg", "fibre_strain": 0.01, "fibre_deviation": "5 deg",
             "places": [{"ply": "ply_2", "region": "web", "wrinkle_length": "20 mm"},
                        {"rectangle": {"centre": ["10 mm", "0 mm"], "length": "20 mm", "width": "10 mm"}, "shear": "30 deg"}],
             "source": "drawing 7",
@@ -251,6 +262,7 @@ mod tests {
         let near = |on, value: f64| (limits.part.of(on).unwrap() - value).abs() < 1e-12;
         assert!(near(LimitOn::WrinkleHeight, 0.5e-3) && near(LimitOn::BridgingArea, 2e-4));
         assert!(near(LimitOn::ShearNegative, -50f64.to_radians()));
+        assert!(near(LimitOn::FibreDeviation, 5f64.to_radians()));
         assert_eq!(limits.part.of(LimitOn::WrinkleLength), None);
         assert!(limits.limit(LimitOn::Shear) && !limits.limit(LimitOn::BridgingGap));
         assert_eq!(limits.places[0].title(), "region web of ply_2");

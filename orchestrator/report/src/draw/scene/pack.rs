@@ -57,6 +57,24 @@ impl Stream {
         }
     }
 
+    /// As [`Stream::points`], with one of `places` places along the largest side of the box.
+    pub(super) fn coarse_points(
+        &mut self,
+        extent: &Extent,
+        places: f64,
+        points: impl Iterator<Item = Vec3>,
+    ) {
+        let step = extent.size.iter().copied().fold(0.0, f64::max) / places;
+        let mut last = [0u16; 3];
+        for p in points {
+            for d in 0..3 {
+                let now = ((p[d] - extent.low[d]) / step).round().clamp(0.0, places) as u16;
+                self.0.extend(now.wrapping_sub(last[d]).to_le_bytes());
+                last[d] = now;
+            }
+        }
+    }
+
     /// Four u32 a cell, each as the difference to the same corner of the cell before. The last corner of a triangle stands twice.
     pub(super) fn cells<'a>(&mut self, cells: impl Iterator<Item = &'a [u32]>) {
         let mut last = [0u32; 4];
@@ -69,11 +87,15 @@ impl Stream {
         }
     }
 
-    /// A u8 a value: its place on the colour scale (0..1, clipped), as the difference to the value before.
+    /// A u8 a value, as the difference to the value before: 0 where there is no value, else 1 and its place on the colour scale (0..1, clipped)
+    /// in 254 steps.
     pub(super) fn places(&mut self, values: impl Iterator<Item = f64>) {
         let mut last = 0u8;
         for v in values {
-            let now = (v.clamp(0.0, 1.0) * 255.0).round() as u8;
+            let now = match v.is_nan() {
+                true => 0,
+                false => 1 + (v.clamp(0.0, 1.0) * 254.0).round() as u8,
+            };
             self.0.push(now.wrapping_sub(last));
             last = now;
         }
