@@ -135,8 +135,8 @@ fn notes(scene: &Scene) -> Markup {
 /// The fields that are mapped, and those of the shape, with the scales of `plies`.
 fn in_3d(study: &Study, plies: &[&Ply]) -> Vec<Legend> {
     let all = Field::ALL.iter().chain(&Field::OF_SHAPE);
-    let thresholds = study.thresholds();
-    all.filter_map(|f| f.legend(plies, thresholds)).collect()
+    let detection = study.detection.as_ref();
+    all.filter_map(|f| f.legend(plies, detection)).collect()
 }
 
 fn controls(scene: &Scene, n: usize) -> Markup {

@@ -37,9 +37,9 @@ pub(super) fn drawn(pair: [&Study; 2], n: usize, drawn: usize, sharp: Sharpness)
 }
 
 fn maps(pair: [&Study; 2], n: usize, plies: &[&Ply], sharp: Sharpness) -> Drawn {
-    let thresholds = pair[0].thresholds().or_else(|| pair[1].thresholds());
+    let detection = (pair[0].detection.as_ref()).or(pair[1].detection.as_ref());
     let all = Field::ALL.iter().chain(&Field::OF_SHAPE);
-    let legends: Vec<Legend> = all.filter_map(|f| f.legend(plies, thresholds)).collect();
+    let legends: Vec<Legend> = all.filter_map(|f| f.legend(plies, detection)).collect();
     let mut blocks = Vec::new();
     for (k, legend) in legends.iter().enumerate() {
         let mut rows = Vec::new();

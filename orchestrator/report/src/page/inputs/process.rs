@@ -7,6 +7,7 @@ use maud::{Markup, html};
 use plyflow_model::scene::{
     DoubleDiaphragm, Hold, Press, PressureCourse, Process, Towards, WeightDirection,
 };
+use plyflow_model::stamping::{ForceCourse, PartMotion, Stamping, StampingPart, TOOL, Vertical};
 
 /// Size of the diagram (px), and its margins: left, top, right, below.
 const SIZE: [f64; 2] = [860.0, 300.0];
@@ -16,7 +17,7 @@ const PLACES: usize = 400;
 
 /// A curve of the history, with its name and what makes the unit of its axis of SI.
 struct Curve<'a> {
-    name: &'static str,
+    name: String,
     values: &'a [f64],
     factor: f64,
     /// Whether its axis is that at the right.
@@ -28,11 +29,12 @@ pub(super) fn drawn(process: &Process, history: Option<&History>) -> Markup {
     let (phases, told) = match process {
         Process::DoubleDiaphragm(p) => (bag(p), bag_words(p)),
         Process::Press(p) => (press(p), press_words(p)),
+        Process::Stamping(p) => (stamping(p), stamping_words(p)),
     };
     let time = history.and_then(|h| h.get("time"));
     let curves = history.map(|h| curves(process, h)).unwrap_or_default();
     html! {
-        h4 { "Process: " @match process { Process::DoubleDiaphragm(_) => "double-diaphragm forming", Process::Press(_) => "press" } }
+        h4 { "Process: " @match process { Process::DoubleDiaphragm(_) => "double-diaphragm forming", Process::Press(_) => "press", Process::Stamping(_) => "stamping between rigid parts" } }
         @match time {
             Some(time) if !curves.is_empty() => { (diagram(&phases, time, &curves)) }
             _ => { p class="note" { "Phases: " (phases.iter().map(|(name, t)| format!("{name} {}", quantity(*t * 1e3, "ms", 4))).collect::<Vec<_>>().join(", ")) ". This run has followed none of them: a drape is geometry alone." } }
@@ -47,6 +49,14 @@ fn bag(p: &DoubleDiaphragm) -> Vec<(&'static str, f64)> {
         ("bagging", p.bagging_time.si()),
         ("lowering", p.lowering_time.si()),
         ("drawing", p.drawing_time.si()),
+        ("settling", p.settling_time.si()),
+    ];
+    all.into_iter().filter(|(_, t)| *t > 0.0).collect()
+}
+
+fn stamping(p: &Stamping) -> Vec<(&'static str, f64)> {
+    let all = [
+        ("forming", p.forming_time.si()),
         ("settling", p.settling_time.si()),
     ];
     all.into_iter().filter(|(_, t)| *t > 0.0).collect()
@@ -117,6 +127,79 @@ fn press_words(p: &Press) -> Vec<String> {
     all
 }
 
+fn stamping_words(p: &Stamping) -> Vec<String> {
+    let part = |part: &StampingPart| {
+        let how = match &part.motion {
+            None => "stands still".to_owned(),
+            Some(PartMotion::Table(rows)) => {
+                let ways = rows.iter().map(|r| r.way.si());
+                format!("moves by {}", quantity(range_of(ways), "m", 4))
+            }
+            Some(PartMotion::Pressed(by)) => {
+                let spring = match by.spring {
+                    Some(k) => format!(" and a spring of {} N/mm", number(k.si() * 1e-3, 4)),
+                    None => String::new(),
+                };
+                match &by.force {
+                    ForceCourse::Value(f) => {
+                        format!("is pressed with {} N{spring}", number(f.si(), 4))
+                    }
+                    ForceCourse::Course(_) => format!("is pressed with a force by a table{spring}"),
+                }
+            }
+        };
+        format!("'{}', {} the plies, {how}", part.name, part.side.word())
+    };
+    let mut all: Vec<String> = p.parts.iter().map(part).collect();
+    if !p.parts.iter().any(|part| part.name == TOOL) {
+        all.insert(0, "the tool stands still".to_owned());
+    }
+    all.extend(p.grippers.iter().map(|g| {
+        format!(
+            "a gripper pulls '{}' with {} N",
+            g.ply,
+            number(g.force.si(), 4)
+        )
+    }));
+    all.extend(p.weight.map(|w| match w {
+        Vertical::Down => "weight downwards".to_owned(),
+        Vertical::Up => "weight upwards".to_owned(),
+    }));
+    all
+}
+
+/// Between the largest and the smallest of them.
+fn range_of(values: impl Iterator<Item = f64>) -> f64 {
+    let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| {
+        [a.min(v), b.max(v)]
+    });
+    (high - low).max(0.0)
+}
+
+/// How far the parts of a stamping are off their places, and at the right what they press with: those that move at all.
+fn of_parts<'a>(p: &Stamping, history: &'a History) -> Vec<Curve<'a>> {
+    let mut all = Vec::new();
+    for (name, _) in p.sides() {
+        for (column, what, factor, right) in [
+            ("way", "way (mm)", 1e3, false),
+            ("force", "force (N)", 1.0, true),
+        ] {
+            let Some(values) = history.get(&format!("{name}/{column}")) else {
+                continue;
+            };
+            if values.iter().any(|v| *v != 0.0) {
+                all.push(Curve {
+                    name: format!("{name}: {what}"),
+                    values,
+                    factor,
+                    right,
+                });
+            }
+        }
+    }
+    all
+}
+
 fn curves<'a>(process: &Process, history: &'a History) -> Vec<Curve<'a>> {
     let all: &[(&str, &'static str, f64, bool)] = match process {
         Process::DoubleDiaphragm(_) => &[
@@ -130,10 +213,11 @@ fn curves<'a>(process: &Process, history: &'a History) -> Vec<Curve<'a>> {
             ("frame_height", "height of the frame (mm)", 1e3, true),
         ],
         Process::Press(_) => &[("frame_height", "punch, from its end (mm)", 1e3, true)],
+        Process::Stamping(p) => return of_parts(p, history),
     };
     let one = |(column, name, factor, right): &(&str, &'static str, f64, bool)| {
         Some(Curve {
-            name,
+            name: (*name).to_owned(),
             values: history.get(column)?,
             factor: *factor,
             right: *right,
@@ -173,7 +257,11 @@ fn diagram(phases: &[(&str, f64)], time: &[f64], curves: &[Curve<'_>]) -> Markup
         .collect();
     let what = format!(
         "Process over time: {}",
-        curves.iter().map(|c| c.name).collect::<Vec<_>>().join(", ")
+        curves
+            .iter()
+            .map(|c| c.name.as_str())
+            .collect::<Vec<_>>()
+            .join(", ")
     );
     html! {
         figure class="plot process" {
