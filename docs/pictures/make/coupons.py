@@ -128,3 +128,25 @@ def hemisphere():
     style.colour_bar(figure, (width + 140, height + 55, 420, 22), off, "distance from punch and die (mm)")
     style.scale_bar(axes, 40, height + 30, 0.05, width / 0.385)
     return style.save_png(figure, "hemisphere", [shear, off])
+
+
+def double_dome():
+    """The woven ply of the double dome, stamped in matched dies and draped: shear, and how it lies on the punch."""
+    place = runs.run("double-dome/workflow-coarse")
+    width, height = 700, 420
+    figure, axes = style.canvas(2 * width, height + 130)
+    shear = ScalarMappable(Normalize(-50, 50), "RdBu_r")
+    for k, (step, title) in enumerate((("stamped", "stamped in matched dies"), ("drape", "draped, where the net reaches"))):
+        formed = runs.artifact(place, step)
+        points, cells = formed.points("ply_1"), formed.cells("ply_1")
+        if step == "drape":
+            cells = cells[formed.field("ply_1", "draped") > 0.5]
+        values = np.degrees(formed.at_points("ply_1", "shear_angle"))
+        view = scene3d.View((width, height), scene3d.Camera(-60, 38, (0, 0, 0.03), 0.5))
+        view.surface(points, cells, spar.paint(values, shear))
+        view.lines(scene3d.grid_lines(points, cells), (0.15, 0.15, 0.15), 0.7, lift=0.0008, share=0.3)
+        style.put(axes, view.picture(), k * width, 0)
+        axes.text(k * width + width / 2, height + 18, title, ha="center", va="top", fontsize=9)
+    style.colour_bar(figure, (width - 210, height + 70, 420, 22), shear, "shear angle (deg)")
+    style.scale_bar(axes, 40, height + 90, 0.1, width / 0.5)
+    return style.save_png(figure, "double-dome", [shear])

@@ -177,7 +177,10 @@ fn moved_scan(folder: &tempfile::TempDir, unit: f64, shift: Vec3) -> String {
 #[test]
 fn a_scan_that_lies_where_nothing_is_judged_is_refused_and_one_that_does_not_says_how_much_is() {
     let folder = tempfile::tempdir().unwrap();
-    let formed = formed();
+    let mut formed = formed();
+    for sheet in formed.attributes["sheets"].as_array_mut().unwrap() {
+        sheet["over_shear"] = json!({"positive": 0.14, "negative": -0.87});
+    }
     let inputs = [MemoryInput::new("formed", &formed)];
     let told = |unit: f64, shift: Vec3, align: &str| {
         let scan = moved_scan(&folder, unit, shift);
@@ -389,7 +392,8 @@ fn stepped() -> MemoryArtifact {
     let sheets: Vec<Value> = (0..3)
         .map(|k| {
             json!({"name": format!("ply_{}", k + 1), "kind": "ply", "offset": OFFSET + f64::from(k) * THICKNESS,
-                   "thickness": THICKNESS, "outline": outline(ends[k as usize].0, ends[k as usize].1)})
+                   "thickness": THICKNESS, "outline": outline(ends[k as usize].0, ends[k as usize].1),
+                   "over_shear": {"positive": 0.14, "negative": -0.87}})
         })
         .collect();
     run.attributes = json!({"sheets": sheets, "contact_by_place": true});
