@@ -393,7 +393,7 @@ pub struct ReportArgs {
     #[arg(long, value_name = "FILE", conflicts_with = "point")]
     pub beside: Option<Utf8PathBuf>,
     /// As `--set`, for the workflow of `--beside`; may be repeated
-    #[arg(long, value_name = "STEP.PARAMETER=VALUE", requires = "beside")]
+    #[arg(long, value_name = "STEP.P=VALUE", requires = "beside")]
     pub beside_set: Vec<String>,
 }
 

@@ -12,9 +12,11 @@ pub fn outline(schema: &Value) -> String {
     let mut writer = Writer {
         definitions: &schema["$defs"],
         written: HashMap::new(),
+        of_file: HashMap::new(),
         open: Vec::new(),
         out: String::new(),
     };
+    writer.note_keys_of_file(schema);
     if let Some(text) = schema["description"].as_str() {
         writer.prose(text, 0);
     }
@@ -27,6 +29,8 @@ struct Writer<'s> {
     definitions: &'s Value,
     /// Definitions whose keys have been written, and under which key.
     written: HashMap<String, String>,
+    /// Definitions of the file's own keys, and which key: they are told there, not where they stand deeper down.
+    of_file: HashMap<String, String>,
     /// Definitions that are being written: one of them within itself (a product of sets of points) would never end.
     open: Vec<String>,
     out: String,
@@ -139,6 +143,15 @@ impl Writer<'_> {
         }
     }
 
+    fn note_keys_of_file(&mut self, schema: &Value) {
+        let file = self.resolve(schema);
+        for (key, one) in file.get("properties").as_object().into_iter().flatten() {
+            if let Some(name) = self.resolve(one).name {
+                self.of_file.insert(name, key.clone());
+            }
+        }
+    }
+
     fn keys(&mut self, schema: &Value, depth: usize) {
         let value = self.resolve(schema);
         self.keys_of(&value, depth);
@@ -236,6 +249,11 @@ impl Writer<'_> {
             if !has_keys {
                 return;
             }
+            if let (Some(key), true) = (self.of_file.get(name), depth > 1) {
+                let text = format!("(keys as under `{key}` of the file)");
+                self.prose(&text, depth + 1);
+                return;
+            }
             if let Some(before) = self.written.get(name) {
                 let text = format!("(keys as under `{before}` above)");
                 self.prose(&text, depth + 1);
@@ -296,6 +314,8 @@ mod tests {
             "plyflow_scene: 1, required",
             "tool: one of, required",
             "  stl: mapping",
+            // Told as a key of the file, and not where a part of a stamping has it first.
+            "          (keys as under `tool` of the file)",
             "    unit: length, more than 0 mm, required",
             "    translate: [length, length, length], default [0 m, 0 m, 0 m]",
             "    up: +x or -x or +y or -y or +z or -z or [number, number, number]",
