@@ -172,7 +172,7 @@ fn own_tool(part: &StampingPart, given: [(&str, bool); 2], path: &Path, found: &
             ));
         }
         Some(PartMotion::Table(rows)) => {
-            if let Some((k, way)) = rows.iter().map(|r| r.way.si()).enumerate().last()
+            if let Some((k, way)) = rows.iter().map(|r| r.way.si()).enumerate().next_back()
                 && way.abs() > SAME
             {
                 let path = path.key("motion").key("table").item(k).key("way");

@@ -56,7 +56,7 @@ impl PartField {
 }
 
 /// What a stamping says of the part at place `k` of its list.
-fn words<'a>(stamping: &'a Stamping, k: usize) -> (&'a StampingPart, String) {
+fn words(stamping: &Stamping, k: usize) -> (&StampingPart, String) {
     let part = &stamping.parts[k];
     (part, format!("scene.process.stamping.parts[{k}]"))
 }
