@@ -184,7 +184,7 @@ fn of_parts<'a>(p: &Stamping, history: &'a History) -> Vec<Curve<'a>> {
             ("way", "way (mm)", 1e3, false),
             ("force", "force (N)", 1.0, true),
         ] {
-            let Some(values) = history.get(&format!("{name}/{column}")) else {
+            let Some(values) = history.get(&format!("parts/{name}/{column}")) else {
                 continue;
             };
             if values.iter().any(|v| *v != 0.0) {
