@@ -42,6 +42,7 @@ check: ## form, lints and the tests that need no HDF5: under a minute once built
 	scripts/check-imports
 	scripts/check-tests
 	scripts/check-lengths
+	scripts/check-features
 	$(CARGO) clippy $(CARGO_FLAGS) --workspace --all-targets -- -D warnings
 	$(CARGO) test $(CARGO_FLAGS) $(QUICK) --tests
 
@@ -84,6 +85,7 @@ lint: ## check form, lints and JSON Schemas
 	scripts/check-imports
 	scripts/check-tests
 	scripts/check-lengths
+	scripts/check-features
 
 bench: build ## measure; rows go to docs/benchmarks
 	$(CARGO) build $(CARGO_FLAGS) -p plyflow-benches
