@@ -42,7 +42,8 @@ impl Palette {
         let t = if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) } * (stops.len() - 1) as f32;
         let i = (t as usize).min(stops.len() - 2);
         let (a, b, w) = (rgb(stops[i]), rgb(stops[i + 1]), t - i as f32);
-        [0, 1, 2].map(|c| a[c] + (b[c] - a[c]) * w)
+        let mix = |c: usize| a[c] + (b[c] - a[c]) * w;
+        [mix(0), mix(1), mix(2)]
     }
 
     /// The stops as CSS colours with their place in 0..1.
@@ -57,7 +58,8 @@ impl Palette {
 }
 
 fn rgb(hex: u32) -> Rgb {
-    [16, 8, 0].map(|s| ((hex >> s) & 255) as f32)
+    let part = |shift: u32| ((hex >> shift) & 255) as f32;
+    [part(16), part(8), part(0)]
 }
 
 /// A range of SI values on a palette.

@@ -254,11 +254,13 @@ impl Canvas {
                 ]
             })
             .collect();
+        // Of each sample, and so without `map` over arrays, which the compiler leaves as calls here: a third of the time of a report.
         let colour = |t: f32, shade: f32| -> [f32; 3] {
-            match paint {
-                Paint::Plain(c) => c.map(|c| c * shade),
-                Paint::Field(_, scale) => scale.palette.at(t).map(|c| c * shade),
-            }
+            let [r, g, b] = match paint {
+                Paint::Plain(c) => c,
+                Paint::Field(_, scale) => scale.palette.at(t),
+            };
+            [r * shade, g * shade, b * shade]
         };
         for (t, shade) in mesh.corners.iter().zip(&shade) {
             let mut corners = t.map(|i| on_screen[i as usize]);
@@ -301,7 +303,8 @@ impl Canvas {
             let (x0, x1) = samples(left, right, w);
             for x in x0..x1 {
                 let along = x as f32 + 0.5 - a[0];
-                let [u, v, s] = weights.map(|(dx, dy, at_a)| at_a + dx * along + dy * from_a);
+                let at = |(dx, dy, at_a): (f32, f32, f32)| at_a + dx * along + dy * from_a;
+                let (u, v, s) = (at(weights[0]), at(weights[1]), at(weights[2]));
                 let mix = |d: usize| u * a[d] + v * b[d] + s * c[d];
                 let (depth, at) = (mix(2), y * w + x);
                 if depth > self.depth[at] {
@@ -353,14 +356,15 @@ impl Canvas {
                         (0..3).for_each(|c| sum[c] += self.colour[at][c]);
                     }
                 }
-                out.extend(sum.map(|v| {
+                let mean = |v: f32| {
                     if drawn > 0.0 {
                         (v / drawn).round() as u8
                     } else {
                         0
                     }
-                }));
-                out.push((255.0 * drawn / (FINE * FINE) as f32).round() as u8);
+                };
+                let opaque = (255.0 * drawn / (FINE * FINE) as f32).round() as u8;
+                out.extend([mean(sum[0]), mean(sum[1]), mean(sum[2]), opaque]);
             }
         }
         out
