@@ -106,6 +106,11 @@ impl Piece {
 /// Cosine of the angle between neighbouring facets beyond which their edge is looked at by itself: less is a chord of something round.
 const CREASE: f64 = 0.985;
 
+/// Where the last search in the tree of each body of a survey ended. The next one looks there first, and what it finds does not depend on it:
+/// only how long it takes.
+#[derive(Debug, Clone)]
+pub(crate) struct Near(Vec<usize>);
+
 /// A tool as its distance field has to see it: its bodies without their bottoms.
 pub(crate) struct Survey {
     mesh: ToolMesh,
@@ -135,11 +140,21 @@ impl Survey {
         &self.trees
     }
 
+    /// Where searches begin that have nothing near behind them.
+    pub fn anywhere(&self) -> Near {
+        Near(vec![0; self.trees.len()])
+    }
+
     /// Distance to the closest point of the triangles (m): of bodies that stand on or in each other the least of their own distances is that
     /// of what they are together, outside of it and in sign.
-    pub fn distance(&self, at: Vec3) -> f64 {
-        let distances = self.trees.iter().map(|t| t.closest(at).signed_distance);
-        distances.fold(f64::INFINITY, f64::min)
+    pub fn distance(&self, at: Vec3, near: &mut Near) -> f64 {
+        let mut least = f64::INFINITY;
+        for (tree, place) in self.trees.iter().zip(&mut near.0) {
+            let (found, there) = tree.closest_from(at, *place);
+            *place = there;
+            least = least.min(found.signed_distance);
+        }
+        least
     }
 
     /// The closest point of the body that a piece is of, and the direction out of the facet there. `hints`: one for each body, where the last
@@ -184,13 +199,23 @@ impl Survey {
 
     /// Places of a piece: its middle, its corners if it is of an edge, and what lies `offset` (m) out of these, where sheets have
     /// their middles; none that another body covers.
-    pub fn places(&self, piece: &Piece, offset: f64, mut visit: impl FnMut(Place)) {
+    pub fn places(
+        &self,
+        piece: &Piece,
+        offset: f64,
+        near: &mut Near,
+        mut visit: impl FnMut(Place),
+    ) {
         let [a, b, c] = piece.corners;
         let ends = if b == c { &[a, b][..] } else { &[] };
         for on in ends.iter().copied().chain([piece.middle()]) {
-            let others = self.trees.iter().enumerate();
+            let others = (self.trees.iter().zip(&mut near.0)).enumerate();
             let mut others = others.filter(|(k, _)| *k != piece.body as usize);
-            let covered = others.any(|(_, tree)| tree.closest(on).signed_distance < 1e-6);
+            let covered = others.any(|(_, (tree, place))| {
+                let (found, there) = tree.closest_from(on, *place);
+                *place = there;
+                found.signed_distance < 1e-6
+            });
             if covered || on[2] < self.low {
                 continue;
             }
@@ -200,7 +225,7 @@ impl Survey {
             });
             if offset > 0.0 {
                 let at = add(on, scale(piece.out, offset));
-                let distance = self.distance(at);
+                let distance = self.distance(at, near);
                 // Between walls closer than that no sheet has room.
                 if at[2] >= self.low && distance > 0.5 * offset {
                     visit(Place { at, distance });
@@ -217,9 +242,9 @@ impl Survey {
         counts: impl Fn(Vec3) -> bool + Sync,
     ) -> FieldError {
         let of = |piece: &Piece| {
-            let mut worst = FieldError::default();
+            let (mut worst, mut near) = (FieldError::default(), self.anywhere());
             piece.parts(spacing, &mut |part| {
-                self.places(&part, offset, |place| {
+                self.places(&part, offset, &mut near, |place| {
                     if counts(place.at) {
                         let largest = (field(place.at) - place.distance).abs();
                         worst = worst.or(FieldError {

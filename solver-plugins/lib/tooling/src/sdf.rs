@@ -305,7 +305,7 @@ impl SignedDistanceGrid {
     /// The block that holds a cell.
     #[inline]
     fn block(&self, cell: [usize; 3]) -> usize {
-        let b = cell.map(|c| c / BLOCK);
+        let b = [cell[0] / BLOCK, cell[1] / BLOCK, cell[2] / BLOCK];
         (b[0] * self.blocks[1] + b[1]) * self.blocks[2] + b[2]
     }
 
@@ -323,7 +323,7 @@ impl SignedDistanceGrid {
         (
             (d - self.nearer).max(0.0),
             if d > 0.0 {
-                away.map(|v| v / d)
+                [away[0] / d, away[1] / d, away[2] / d]
             } else {
                 [0.0; 3]
             },
@@ -353,8 +353,9 @@ fn evaluate(
     part: [f32; 3],
     inverse: f64,
 ) -> (f64, Vec3) {
-    let [wx, wy, wz] = part.map(weights);
-    let [dx, dy, dz] = part.map(slopes);
+    // One by one: the compiler leaves `map` over arrays as calls here, in the innermost loop of contact with a tool.
+    let (wx, wy, wz) = (weights(part[0]), weights(part[1]), weights(part[2]));
+    let (dx, dy, dz) = (slopes(part[0]), slopes(part[1]), slopes(part[2]));
     // Sums over x and y of rows along z: value, slope along x, slope along y.
     let (mut v, mut vx, mut vy) = ([0f32; 4], [0f32; 4], [0f32; 4]);
     for a in 0..4 {

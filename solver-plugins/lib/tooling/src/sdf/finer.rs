@@ -8,7 +8,7 @@
 //! eight bricks of level 1, below each of these eight of level 2.
 
 use super::{BLOCK, SignedDistanceGrid, evaluate};
-use crate::audit::{FieldError, Piece, Place, Survey};
+use crate::audit::{FieldError, Near, Piece, Place, Survey};
 use plyflow_geometry::vec3::Vec3;
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -85,10 +85,10 @@ impl Finer {
             return;
         }
         let mut eight = self.roots[block];
-        let mut inner = cell.map(|c| c % BLOCK);
+        let mut inner = [cell[0] % BLOCK, cell[1] % BLOCK, cell[2] % BLOCK];
         let (mut part, mut inverse) = (part, 1.0 / spacing);
         while eight != NONE {
-            let octant = inner.map(|c| c >> 1);
+            let octant = [inner[0] >> 1, inner[1] >> 1, inner[2] >> 1];
             let brick = self.eights[eight as usize][(octant[0] * 2 + octant[1]) * 2 + octant[2]];
             inverse *= 2.0;
             for k in 0..3 {
@@ -276,10 +276,11 @@ impl SignedDistanceGrid {
         survey: &Survey,
         part: &Piece,
         wanted: &Wanted<'_>,
+        near: &mut Near,
         mut visit: impl FnMut(FieldError),
     ) -> Option<FieldError> {
         let mut worst = None;
-        survey.places(part, wanted.offset, |Place { at, distance }| {
+        survey.places(part, wanted.offset, near, |Place { at, distance }| {
             if (wanted.counts)(at) {
                 let largest = (self.distance_and_gradient(at).0 - distance).abs();
                 let error = FieldError { largest, at };
@@ -299,11 +300,11 @@ impl SignedDistanceGrid {
         wanted: &Wanted<'_>,
     ) -> Vec<Looked> {
         let of = |pieces: &[Piece]| {
-            let mut looked = Looked::default();
+            let (mut looked, mut near) = (Looked::default(), survey.anywhere());
             for piece in pieces {
                 piece.parts(spacing, &mut |part| {
                     let failing = &mut looked.failing;
-                    let error = self.at_part(survey, &part, wanted, |e| {
+                    let error = self.at_part(survey, &part, wanted, &mut near, |e| {
                         if e.largest > ENOUGH * wanted.tolerance {
                             failing.push(e.at);
                         }
@@ -344,7 +345,9 @@ impl SignedDistanceGrid {
                     }
                 });
             }
-            let error = worst.and_then(|part| self.at_part(survey, &part, wanted, |_| ()));
+            let error = worst.and_then(|part| {
+                self.at_part(survey, &part, wanted, &mut survey.anywhere(), |_| ())
+            });
             (again, error.unwrap_or_default())
         };
         let all: Vec<(Vec<Piece>, FieldError)> =
@@ -393,7 +396,7 @@ impl SignedDistanceGrid {
             let within = |b: &[i64; 3]| (0..3).all(|k| (-2..=6).contains(&(node[k] - b[k])));
             near.iter().any(within)
         };
-        let mut left = [0f32; 64];
+        let (mut left, mut closest) = ([0f32; 64], survey.anywhere());
         for (n, left) in left.iter_mut().enumerate() {
             let node = [n / 16, n / 4 % 4, n % 4];
             if !asked(node.map(|c| c as i64)) {
@@ -404,7 +407,8 @@ impl SignedDistanceGrid {
             });
             // Outside of the box there is no field to correct.
             if self.cell(at).is_some() {
-                *left = (survey.distance(at) - self.distance_and_gradient(at).0) as f32;
+                *left =
+                    (survey.distance(at, &mut closest) - self.distance_and_gradient(at).0) as f32;
             }
         }
         left
