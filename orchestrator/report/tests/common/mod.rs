@@ -3,13 +3,12 @@
 
 mod extras;
 pub mod family;
-mod found;
+pub mod found;
 mod labels;
 mod shapes;
 
 use camino::{Utf8Path, Utf8PathBuf};
 use extras::{further_fields, history};
-pub use found::BESIDE;
 use labels::{as_refs, key, label_of, split};
 use plyflow_artifact::{ArtifactWriter, DType, FieldInfo, On};
 use plyflow_model::job::{Cost, NamedResult, Record};
