@@ -212,10 +212,11 @@ pub(super) fn results(input: &ReportInput, open: bool) -> Markup {
     html! {
         section id="results" {
             h2 { "All results" }
+            p class="on-paper note" { "The numbers of all steps stand in this report on the screen. " code { "plyflow results" } " prints them too." }
             @if with.is_empty() { p { "No step reported a result." } }
             @if with.len() > LONGEST { p class="note" { "The first " (LONGEST) " of " (with.len()) " steps with results." } }
             @for i in with.iter().take(LONGEST) {
-                details open[open && with.len() <= 12] {
+                details class="on-screen" open[open && with.len() <= 12] {
                     summary { code { (i.label()) } " " span class="note" { (i.record.results.len()) " numbers" } }
                     table { tbody { @for r in &i.record.results {
                         tr { td { (r.name) @if r.measured { span class="note" { " (measured)" } } } td class="n" { (quantity(r.value, &r.unit, 6)) } }
