@@ -127,8 +127,6 @@ fn a_pressed_part_without_travel_goes_on_to_the_part_that_it_meets_and_the_plies
     // A ply that only rests takes nanojoules, of which a bound in per cent says nothing.
     let resting = |p: &mut Value| p["drift_bound"] = json!(1e6);
     let force = json!({"pressed": {"force": "40 N"}});
-    let down =
-        json!({"table": [{"time": "0 s", "way": "0.0051 m"}, {"time": "0.08 s", "way": "0 m"}]});
     let travel = |forming: &Forming, name: &str| {
         let load = forming.load.stamping().unwrap();
         let part = load.parts.iter().find(|p| p.name.word() == name).unwrap();
@@ -165,37 +163,6 @@ fn a_pressed_part_without_travel_goes_on_to_the_part_that_it_meets_and_the_plies
     );
     // The ply holds it: it is far from its stop.
     assert!(way < 0.0 && way > -0.1 * travel(&forming, "pad"), "{way}");
-    // A stop where it is drawn would take all of that.
-    let held = with(
-        pad("pad", 0.0, 0.0103),
-        json!({"pressed": {"force": "40 N", "travel": "0 mm"}}),
-    );
-    let (_, outcome) = form(&stamped(process(&[held]), resting), 1);
-    let [stopped, way] = outcome.history.last().unwrap().parts[1];
-    assert!(way == 0.0 && stopped < 1.0, "{stopped} N at {way}");
-    // A punch that ends where the holder is drawn, and one that goes past it.
-    let p = stamped(
-        process(&[
-            with(pad("punch", 0.055, 0.0053), down.clone()),
-            with(block("holder", 0.055), force.clone()),
-        ]),
-        resting,
-    );
-    assert_eq!(travel(&build_global(&p, &BuiltIn).unwrap(), "holder"), 0.0);
-    let p = stamped(
-        process(&[
-            with(pad("punch", 0.0, 0.0103), down),
-            with(block("holder", 0.055), force),
-        ]),
-        resting,
-    );
-    let forming = build_global(&p, &BuiltIn).unwrap();
-    assert_eq!(travel(&forming, "holder"), 0.0);
-    let told = &forming.tool_warnings;
-    assert!(
-        told.len() == 1 && told[0].contains("`holder`") && told[0].contains("`travel`"),
-        "{told:?}"
-    );
 }
 
 #[test]
@@ -299,62 +266,6 @@ fn a_gripper_pulls_with_its_force_and_its_spring_against_the_draw_in() {
         force < 5.9 && (force - (6.0 + 20000.0 * drawn)).abs() < 0.02,
         "{force} N at {drawn} m"
     );
-}
-
-/// A ply with weight that lies on nothing but a wide part; `parts` says what there is, and the tool is as wide as the ply.
-fn heavy(weight: &str, blank: f64, parts: &[Value]) -> Vec<[f64; 2]> {
-    let mut stamping = process(parts);
-    stamping["weight"] = json!(weight);
-    stamping["blank_height"] = json!(format!("{blank} m"));
-    stamping["settling_time"] = json!("0.2 s");
-    let p = stamped(stamping, |p| {
-        p["scene"]["tool"]["flat"]["length"] = json!("0.2 m");
-        // What only rests takes nanojoules, of which a bound in per cent says nothing.
-        p["drift_bound"] = json!(1e6);
-    });
-    let (_, outcome) = form(&p, 1);
-    outcome.history.last().unwrap().parts.clone()
-}
-
-#[test]
-fn what_a_ply_lies_on_bears_its_weight_and_a_spring_gives_way_by_it() {
-    // Mass that is added for the time step (2 kg/m2 in all) has no weight: that of the fabric has, over 160 x 48 mm.
-    let weight = plyflow_model::STANDARD_GRAVITY * 0.21 * 0.16 * 0.048;
-    let is_weight = |force: f64| (force / weight - 1.0).abs() < 0.01;
-    let wide = |mut part: Value| {
-        part["tool"]["flat"]["length"] = json!("0.2 m");
-        part
-    };
-    let down =
-        json!({"table": [{"time": "0 s", "way": "0.02 m"}, {"time": "0.08 s", "way": "0 m"}]});
-    // On the tool, under a pad that comes down to 5 mm over it.
-    let above = with(pad("pad", 0.0, 0.0153), down.clone());
-    let [[tool, _], [pad_force, _]] = heavy("down", 0.01, &[above])[..] else {
-        panic!("two parts")
-    };
-    assert!(
-        is_weight(tool) && pad_force == 0.0,
-        "{tool} {pad_force} of {weight}"
-    );
-    // Under a pad, when all stands on its head, over a tool that comes up to 1 mm under it.
-    let moving = json!({"name": "tool", "side": "below", "motion": down});
-    let parts = [moving, wide(pad("pad", 0.0, 0.0113))];
-    let [[tool, _], [pad_force, _]] = heavy("up", 0.011, &parts)[..] else {
-        panic!("two parts")
-    };
-    assert!(
-        is_weight(pad_force) && tool == 0.0,
-        "{tool} {pad_force} of {weight}"
-    );
-    // On a block over the tool that rests on a spring.
-    let spring = json!({"pressed": {"force": "0 N", "spring": "400 N/m", "travel": "0 mm", "mass": "0.01 kg"}});
-    let mut rest = wide(block("rest", 0.0));
-    rest["foot"] = json!("0.02 m");
-    let [[tool, _], [force, way]] = heavy("down", 0.03, &[with(rest, spring)])[..] else {
-        panic!("two parts")
-    };
-    assert!(is_weight(force) && tool == 0.0, "{force} of {weight}");
-    assert!((way / (weight / 400.0) - 1.0).abs() < 0.01, "{way}");
 }
 
 /// The strain of the fibres of family 1, as membranes have it.
