@@ -1,7 +1,7 @@
 //! What of an artifact is exported: its bodies in one frame, with the fields that are stored and those that follow from the shape.
 
 use crate::error::ExportError;
-use crate::fibres::{Sheared, sheared};
+use crate::fibres::{Sheared, deviations, sheared};
 use crate::request::{Format, LengthUnit, Request};
 use crate::vec3::Vec3;
 use plyflow_artifact::{Artifact, BodyInfo, On};
@@ -340,7 +340,7 @@ fn derive(body: &mut Body, number: usize, sheet: &Sheet, told: &mut Vec<String>)
     );
     let mut unknown = Vec::new();
     match sheet.fibres() {
-        Some(_) => add_fibres(body, &shapes, told),
+        Some(laid) => add_fibres(body, &shapes, laid, told),
         None => unknown.push("its fibre directions"),
     }
     match &thickness {
@@ -365,7 +365,8 @@ fn derive(body: &mut Body, number: usize, sheet: &Sheet, told: &mut Vec<String>)
     });
 }
 
-fn add_fibres(body: &mut Body, shapes: &[Option<Sheared>], told: &mut Vec<String>) {
+/// `laid`: directions of both families in the flat ply (rad, from x).
+fn add_fibres(body: &mut Body, shapes: &[Option<Sheared>], laid: [f64; 2], told: &mut Vec<String>) {
     for family in 0..2 {
         let of = |s: &Option<Sheared>| s.map_or([f64::NAN; 3], |s| s.directions[family]);
         let values = shapes.iter().flat_map(of).collect();
@@ -382,6 +383,15 @@ fn add_fibres(body: &mut Body, shapes: &[Option<Sheared>], told: &mut Vec<String
         shapes.iter().map(angle).collect(),
         told,
     );
+    // As the limit `fibre_deviation` counts them: none where the ply stands across the axis from which they are told.
+    let turned = |s: &Option<Sheared>| deviations(s.as_ref()?, laid);
+    let turned: Vec<Option<[f64; 2]>> = shapes.iter().map(turned).collect();
+    for family in 0..2 {
+        let of = |d: &Option<[f64; 2]>| d.map_or(f64::NAN, |d| d[family]);
+        let field = format!("fibre_deviation_{}", family + 1);
+        let values = turned.iter().map(of).collect();
+        add(body, &field, On::Cells, 1, "rad", values, told);
+    }
 }
 
 /// Where the numbers come from, in lines of plain text.

@@ -99,6 +99,20 @@ fn tables_have_fibres_thickness_and_mass_of_the_closed_form() {
             close("thickness (m)", 0.0005 / ratio);
             close("areal_mass (kg/m2)", 0.44 / ratio);
             close("ply", number);
+            // The square is tilted about x, so that x still is the axis on it: from there the fibre has turned by the shear and the stretch.
+            let laid = (first + 90.0 * f64::from(family)).to_radians();
+            let (tilt_sin, tilt_cos) = square::TURN.sin_cos();
+            let across = tilt_cos * expected[1] + tilt_sin * expected[2];
+            let turned = across.atan2(expected[0]) - laid;
+            assert!(
+                turned.abs() > 0.01 || (first == 0.0 && family == 0),
+                "{turned}"
+            );
+            let found = column(table, &format!("fibre_deviation_{} (rad)", family + 1));
+            assert!(
+                found.len() == 16 && found.iter().all(|v| (v - turned).abs() < 1e-14),
+                "{ply}, family {family}: {found:?}, not {turned}"
+            );
             directions.push(expected);
         }
         let cosine: f64 = (0..3).map(|k| directions[0][k] * directions[1][k]).sum();

@@ -24,6 +24,7 @@ pub use family::{Family, Fate, Origin, Point, Response, Sampled, Value, Variable
 pub use input::{Expectation, Instance, ReportInput, Verdict};
 pub use judge::judge;
 pub use judged::{Finding, Judged, Kept};
+pub use page::inputs::laws::{LawCurve, curves as law_curves};
 pub use read::{COUNTS, Measure, OfClass, TARGETS, Way, Ways, advice, ways};
 pub use summary::summary;
 pub use told::{allowed_text, failing, found_text, in_short, reasons, table as limit_table};

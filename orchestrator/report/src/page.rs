@@ -10,7 +10,7 @@ mod energy;
 pub(crate) mod expectations;
 mod family;
 mod fidelity;
-mod inputs;
+pub(crate) mod inputs;
 mod maps;
 mod provenance;
 mod steps;

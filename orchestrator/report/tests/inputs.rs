@@ -93,3 +93,62 @@ fn runs_of_two_scenes_have_two_sets_of_inputs_and_press_and_holder_are_told_in_w
     assert!(told.contains("Of coarse") && told.contains("Of other"));
     assert!(told.contains("stroke 50 mm; die with an opening of 51 mm radius and an edge of 6 mm; blank holder with 250 N"));
 }
+
+#[test]
+fn ways_and_forces_of_the_parts_of_a_stamping_are_drawn_over_time() {
+    let (_keep, folder) = folder();
+    let mut study = Study::new(&folder);
+    let flat = json!({"flat": {"length": "0.2 m", "width": "0.1 m", "height": "0.01 m", "fillet": "0.002 m", "facet_size": "0.01 m"}});
+    study.scene["process"] = json!({"stamping": {"forming_time": "0.8 s", "settling_time": "0.2 s", "parts": [
+        {"name": "punch", "side": "above", "tool": flat.clone(), "motion": {"table": [{"time": "0 s", "way": "0.03 m"}, {"time": "0.8 s", "way": "0 m"}]}},
+        {"name": "holder", "side": "below", "tool": flat, "motion": {"pressed": {"force": "40 N"}}}]}});
+    // The scene's tool stands still and is pressed on by nothing.
+    study.parts = vec![("punch", 250.0), ("holder", 40.0)];
+    study.forming("coarse", None, 0.008);
+    let told = inputs(&study.input(), &folder).unwrap();
+    for name in [
+        "punch: way (mm)",
+        "punch: force (N), at the right",
+        "holder: way (mm)",
+        "holder: force (N), at the right",
+    ] {
+        assert!(
+            told.contains(&format!("</svg> {name}")),
+            "{name} is not in {told}"
+        );
+    }
+    assert!(!told.contains("tool: way"));
+    // Four curves, each of a line that goes on to its end.
+    let from = told.find("aria-label=\"Process over time").unwrap();
+    let diagram = &told[from..from + told[from..].find("</svg>").unwrap()];
+    let paths: Vec<&str> = diagram.split("<path class=\"line c").skip(1).collect();
+    assert_eq!(paths.len(), 4);
+    let ends = |path: &str| -> [[f64; 2]; 2] {
+        let d = path
+            .split("d=\"")
+            .nth(1)
+            .unwrap()
+            .split('"')
+            .next()
+            .unwrap();
+        let place = |s: &str| {
+            let mut n = s.trim().split([' ', ',']).map(|n| n.parse().unwrap());
+            [n.next().unwrap(), n.next().unwrap()]
+        };
+        let all: Vec<[f64; 2]> = d
+            .split(['M', 'L'])
+            .filter(|s| !s.is_empty())
+            .map(place)
+            .collect();
+        [all[0], all[all.len() - 1]]
+    };
+    let [[_, open], [_, closed]] = ends(paths[0]);
+    let [[_, bare], [_, pressed]] = ends(paths[1]);
+    assert!(open < closed, "the way falls: the picture's y counts down");
+    assert!(bare > pressed, "the force grows");
+    // Both parts close alike, and the holder's force at the end is 40 of 250 of the punch's, on one axis.
+    assert_eq!(ends(paths[2]), ends(paths[0]));
+    let [[_, from], [_, to]] = ends(paths[3]);
+    let share = (from - to) / (bare - pressed);
+    assert!((share - 40.0 / 250.0).abs() < 0.01, "{share}");
+}

@@ -3,7 +3,7 @@
 mod common;
 
 use camino::{Utf8Path, Utf8PathBuf};
-use common::{ZONES, family, whole, whole_study};
+use common::{Study, ZONES, family, whole, whole_study};
 use plyflow_model::workflow::{LimitOn, Limits};
 use plyflow_report::{Judged, Kept, ReportInput, failing, judge, summary, write_report};
 use serde_json::{Value, json};
@@ -70,6 +70,30 @@ fn defects_are_judged_by_the_fine_runs_and_shear_by_every_cell_of_the_finest_run
     assert_eq!(
         failing(&input.judged).unwrap(),
         "2 limits exceeded: wrinkle length, positive shear angle; 1 limit not judged: bridging area"
+    );
+}
+
+#[test]
+fn what_hangs_beside_the_tool_is_no_gap_though_it_is_far_from_it() {
+    let (_keep, folder) = folder();
+    let mut study = Study::new(&folder);
+    // Cells that are flagged reach to where the tool ends, and beyond lies the ply 50 mm off it.
+    study.beside_tool = true;
+    study.forming("coarse", None, 0.004);
+    study.defects(false);
+    let input = with(study.input(), json!({"bridging_gap": "7 mm"}));
+    let gap = of(&input, LimitOn::BridgingGap, None);
+    assert_eq!(gap.verdict, Kept::Within, "{gap:?}");
+    let worst = gap.worst.unwrap();
+    assert!(
+        worst.value > 0.005 && worst.value < 0.0061,
+        "{}",
+        worst.value
+    );
+    let page = page(&input, &folder);
+    assert!(
+        page.contains("<th class=\"n\">judged (%)</th>")
+            && page.contains("<td class=\"n\">74</td>")
     );
 }
 

@@ -4,6 +4,7 @@ mod common;
 
 use base64::Engine;
 use camino::{Utf8Path, Utf8PathBuf};
+use common::found::BESIDE;
 use common::{Study, whole, whole_study};
 use plyflow_artifact::{Artifact, On};
 use plyflow_report::{ReportInput, write_report};
@@ -94,8 +95,61 @@ impl Scene {
     }
 }
 
+/// Reads a body to its end, and gives its fields: 0 where there is no value.
+fn fields(scene: &mut Scene, body: &Value) -> Vec<Vec<u64>> {
+    let points = body["points"].as_u64().unwrap();
+    scene.points(points);
+    for part in list(&body["parts"]) {
+        scene.take(4 * part["cells"].as_u64().unwrap(), 4, 4);
+    }
+    let all = list(&body["fields"]);
+    let all = all.iter().map(|_| scene.take(points, 1, 1)).collect();
+    for fibres in list(&body["fibres"]) {
+        scene.lines(&fibres);
+    }
+    scene.points(2 * body["edges"].as_u64().unwrap());
+    all
+}
+
 fn list(value: &Value) -> Vec<Value> {
     value.as_array().unwrap().clone()
+}
+
+#[test]
+fn where_no_distance_is_judged_the_ply_is_grey_and_the_scale_does_not_see_it() {
+    let (_keep, folder) = folder();
+    let mut study = Study::new(&folder);
+    study.beside_tool = true;
+    study.forming("coarse", None, 0.004);
+    study.defects(false);
+    let page = page(&study.input(), &folder);
+    let mut scene = Scene::of(&page);
+    // The tool comes first.
+    let [_, fields] = [0, 1].map(|n| {
+        let body = scene.told["bodies"][n].clone();
+        fields(&mut scene, &body)
+    });
+    let artifact = Artifact::open(folder.join("detect.h5").as_std_path()).unwrap();
+    let flat = artifact.frame_field("ply_1", 0, On::Points, "undeformed");
+    let unknown = |(place, at): (&u64, &[f64])| (*place == 0) == (at[0] > BESIDE[1]);
+    let flat = flat.unwrap();
+    assert!(
+        fields[1].iter().zip(flat.chunks(3)).all(unknown),
+        "the distance"
+    );
+    assert!(
+        fields[0].iter().all(|place| *place > 0),
+        "the shear is known"
+    );
+    // The range is that of what is judged, and not the 50 mm beside the tool.
+    let ranges: Vec<f64> = (page.split("<b>mm</b>; values from ").skip(1))
+        .map(|rest| rest.split(" to ").nth(1).unwrap())
+        .map(|rest| rest.split([' ', '.']).next().unwrap().parse().unwrap())
+        .collect();
+    assert!(
+        !ranges.is_empty() && ranges.iter().all(|r| *r < 7.0),
+        "{ranges:?}"
+    );
 }
 
 #[test]

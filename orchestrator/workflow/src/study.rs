@@ -3,6 +3,7 @@
 //! A step of the file becomes one step for every combination of the values that it, or what arrives at it, depends on. What depends on no
 //! variable is there once. Wires are those of the file, within a point.
 
+mod cells;
 mod family;
 mod optimise;
 mod points;

@@ -26,6 +26,11 @@ impl Process {
         }
     }
 
+    /// Whether there is no machine bed under the tool: what hangs beside it hangs in the air.
+    pub fn is_without_bed(&self) -> bool {
+        !matches!(self, Self::DoubleDiaphragm(_))
+    }
+
     /// The word for it in a scene file.
     pub fn word(&self) -> &'static str {
         match self {

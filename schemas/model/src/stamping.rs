@@ -194,10 +194,11 @@ pub struct Pressed {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-minimum" = "0 N/m"))]
     pub spring: Option<ForcePerLength>,
-    /// How far the part may go beyond the place where it is drawn, towards the sheets. There is its stop.
-    #[serde(default)]
+    /// How far the part may go beyond the place where it is drawn, towards the sheets. There is its stop. Left out: until it meets a part on the other
+    /// side of the plies, where that one ends.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-minimum" = "0 mm"))]
-    pub travel: Length,
+    pub travel: Option<Length>,
     /// Its mass; left out: five times that of the plies, shared by all parts that are pressed, and at least once that of the plies.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("x-exclusive-minimum" = "0 kg"))]

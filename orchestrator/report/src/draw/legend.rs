@@ -52,7 +52,8 @@ impl Field {
             Self::Distance => [
                 "Nodal distance",
                 "m",
-                "Distance of the ply from where it would lie on the tool; large where it bridges or wrinkles.",
+                "Distance of the ply from where it would lie on the tool; large where it bridges or wrinkles. Grey where there is no tool to lie on: \
+                 at its foot, past an edge of it, over a hole in it.",
             ],
             Self::Curvature => [
                 "Curvature",

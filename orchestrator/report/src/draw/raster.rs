@@ -6,6 +6,8 @@ use base64::Engine;
 
 /// Samples per pixel and direction.
 const FINE: usize = 2;
+/// Where a field has no value, as in the 3D view.
+const UNKNOWN: Rgb = [184.0, 184.0, 184.0];
 /// Cosine of the angle from which on two faces meet at a sharp edge: 35 degrees.
 const CREASE: f64 = 0.819_152_044_288_992;
 
@@ -258,6 +260,7 @@ impl Canvas {
         let colour = |t: f32, shade: f32| -> [f32; 3] {
             let [r, g, b] = match paint {
                 Paint::Plain(c) => c,
+                Paint::Field(..) if t.is_nan() => UNKNOWN,
                 Paint::Field(_, scale) => scale.palette.at(t),
             };
             [r * shade, g * shade, b * shade]

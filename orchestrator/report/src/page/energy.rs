@@ -3,7 +3,7 @@
 use crate::page::content::Content;
 use crate::plain::{Plot, Series, Style};
 use crate::read::Run;
-use crate::units::{fixed, number};
+use crate::units::{fixed, number, plural};
 use maud::{Markup, html};
 use plyflow_model::artifact::PenetrationPeak;
 
@@ -22,6 +22,9 @@ const ENERGIES: [Column; 6] = [
 
 /// A plot of loads: title, label of its values, and what is drawn.
 type Loads = (&'static str, &'static str, &'static [Column]);
+
+/// Runs whose courses are printed too. Those of the zones of a part would fill a page each.
+const ON_PAPER: usize = 1;
 
 /// Loads of a press.
 const PRESS: [Loads; 2] = [
@@ -91,17 +94,30 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
                 h2 { "Energy and contact" }
                 (health(&runs))
                 p class="note" { "Kinetic over internal energy counts while the internal one is above 5 % of its largest; curves end at three times the bound." }
-                @for (whole, run) in &runs {
-                    @if run.history.get("time").is_some() {
+                @let shown = courses(&runs);
+                @for (k, (whole, run)) in shown.iter().enumerate() {
+                    div class=[(k >= ON_PAPER).then_some("on-screen")] {
                         h3 { code { (run.label) } }
                         div class="plots" { (plots(run, *whole)) }
                     }
                 }
-                (penetrations(&runs))
-                (watched(&runs))
+                p class="on-paper note" {
+                    @if shown.len() > ON_PAPER { "The courses of " (plural(shown.len() - ON_PAPER, "further run", "further runs")) ", and the tables of penetration and depth" }
+                    @else { "The tables of penetration and depth" }
+                    " stand in this report on the screen. What is beyond a bound is among the warnings."
+                }
+                div class="on-screen" { (penetrations(&runs)) (watched(&runs)) }
             }
         }
     }
+}
+
+/// The runs that have a history, those of the whole first.
+fn courses<'a>(runs: &[(bool, &'a Run)]) -> Vec<(bool, &'a Run)> {
+    let told = runs.iter().filter(|(_, r)| r.history.get("time").is_some());
+    let mut told: Vec<(bool, &Run)> = told.copied().collect();
+    told.sort_by_key(|(whole, _)| !whole);
+    told
 }
 
 fn percent(v: Option<f64>) -> String {

@@ -1,7 +1,7 @@
 //! What went in: ply book, materials, friction, process and tool, as the run had them.
 
 mod friction;
-mod laws;
+pub(crate) mod laws;
 mod plies;
 mod process;
 mod tool;

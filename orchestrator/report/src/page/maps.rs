@@ -5,7 +5,7 @@ use crate::draw::{
 };
 use crate::plain::{Place, Ply, id_of};
 use crate::read::{Local, Study};
-use crate::units::quantity;
+use crate::units::{plural, quantity};
 use maud::{Markup, html};
 use plyflow_model::artifact::ComparedDefect;
 use rayon::prelude::*;
@@ -158,7 +158,12 @@ fn zone(
             h3 { "Zone " (local.zone) }
             p class="note" { "Step " code { (local.run.label) } ", elements of "
                 (quantity(local.run.facts.element_size, "m", 3)) "." }
+            @let bare = rows.iter().filter(|(_, found, _)| compared.is_some() && *found == 0).count();
+            @if bare > 0 {
+                p class="on-paper note" { (plural(bare, "ply", "plies")) " of this zone without wrinkle and bridging: on the screen alone." }
+            }
             @for (name, found, figures) in &rows {
+              div class=[(compared.is_some() && *found == 0).then_some("on-screen")] {
                 h4 { (name) span class="note" { ": "
                     @if compared.is_none() { "not compared" }
                     @else if *found == 0 { "no wrinkle, no bridging" }
@@ -168,6 +173,7 @@ fn zone(
                         figure class="map" { (figure) figcaption { (title) } }
                     }
                 }
+              }
             }
         }
     })

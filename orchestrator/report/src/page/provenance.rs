@@ -27,6 +27,7 @@ pub(super) fn section(input: &ReportInput, rest: &ReportInput, material: &Materi
             @if rest.instances.len() > LONGEST {
                 p class="note" { "The first " (LONGEST) " of " (rest.instances.len()) " steps." }
             }
+            p class="on-paper note" { "What each step was made of (plugin, inputs, parameters) stands in this report on the screen." }
             @for (i, facts) in rest.instances.iter().zip(&material.facts).take(LONGEST) {
                 (instance(i, facts.as_ref()))
             }
@@ -51,7 +52,7 @@ fn instance(i: &Instance, facts: Option<&Facts>) -> Markup {
     let p = facts.map_or(&none, |f| &f.provenance);
     let plugin = &p["plugin"];
     html! {
-        details class="provenance" {
+        details class="provenance on-screen" {
             summary {
                 code { (i.label()) } " "
                 span class="note" { (binary(plugin)) " · key " (short(&i.record.key)) }

@@ -41,7 +41,8 @@ pub(super) fn zones(study: &Study) -> Markup {
                 @if let Some(d) = &study.detection {
                     div class="scroll" { table {
                         thead { tr { th { "ply" } th class="n" { "flagged (mm²)" } th class="n" { "over-sheared (mm²)" }
-                            th class="n" { "off the tool (mm²)" } th class="n" { "shear (deg)" } th class="n" { "largest distance (mm)" } } }
+                            th class="n" { "off the tool (mm²)" } th class="n" { "shear (deg)" } th class="n" { "largest distance (mm)" }
+                            th class="n" { "judged (%)" } } }
                         tbody { @for p in &d.plies { tr {
                             th { (p.name) }
                             @for area in [Some(p.flagged_area), p.over_shear_area, Some(p.poor_conformity_area)] {
@@ -49,8 +50,13 @@ pub(super) fn zones(study: &Study) -> Markup {
                             }
                             td class="n" { (fixed(p.shear_min.to_degrees(), 1)) " … " (fixed(p.shear_max.to_degrees(), 1)) }
                             td class="n" { (fixed(p.distance_max * 1e3, 2)) }
+                            td class="n" { (p.judged_share.map_or_else(|| "–".to_owned(), |s| fixed(100.0 * s, 0))) }
                         } } }
                     } }
+                    @if d.plies.iter().any(|p| p.judged_share.is_some_and(|s| s < 1.0)) {
+                        p class="note" { "Judged: the share of the ply whose distance from the tool is judged. The rest has no tool to lie on: it lies at the \
+                            tool's foot or past an edge of it, or over a hole in it, and is grey on the maps of the distance." }
+                    }
                 }
             }
         }
@@ -206,10 +212,11 @@ pub(super) fn results(input: &ReportInput, open: bool) -> Markup {
     html! {
         section id="results" {
             h2 { "All results" }
+            p class="on-paper note" { "The numbers of all steps stand in this report on the screen. " code { "plyflow results" } " prints them too." }
             @if with.is_empty() { p { "No step reported a result." } }
             @if with.len() > LONGEST { p class="note" { "The first " (LONGEST) " of " (with.len()) " steps with results." } }
             @for i in with.iter().take(LONGEST) {
-                details open[open && with.len() <= 12] {
+                details class="on-screen" open[open && with.len() <= 12] {
                     summary { code { (i.label()) } " " span class="note" { (i.record.results.len()) " numbers" } }
                     table { tbody { @for r in &i.record.results {
                         tr { td { (r.name) @if r.measured { span class="note" { " (measured)" } } } td class="n" { (quantity(r.value, &r.unit, 6)) } }

@@ -182,6 +182,7 @@ pub(super) fn section(input: &ReportInput, material: &Material, apart: bool) -> 
         @if !warnings.is_empty() {
             section class="warnings" id="warnings" {
                 h2 { "Warnings" }
+                p class="on-paper note" { "The solvers' own words are folded under each of these in this report on the screen." }
                 @for about in About::ALL {
                     @let groups = of(about);
                     @if !groups.is_empty() {

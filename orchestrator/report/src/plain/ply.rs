@@ -56,7 +56,7 @@ pub(crate) struct Ply {
     pub(crate) cells: Vec<[u32; 4]>,
     /// Shear angle per cell (rad).
     pub(crate) shear: Option<Vec<f64>>,
-    /// Distance from the tool per point (m).
+    /// Distance from the tool per point (m); NaN where it is not judged, as there is no tool to lie on.
     pub(crate) distance: Option<Vec<f64>>,
     /// Principal curvature of largest magnitude per point (1/m).
     pub(crate) curvature: Option<Vec<f64>>,

@@ -3,6 +3,7 @@
 
 use crate::plain::{Cells, FieldMap, Panel, at_points};
 use crate::read::carried::{list, pretty, to_si, unreadable, without_list};
+use crate::read::plies::judged_distance;
 use plyflow_artifact::{Artifact, On};
 use plyflow_model::artifact;
 use serde::Deserialize;
@@ -108,6 +109,9 @@ fn panel(value: &Value, unit: &str, artifact: &Artifact) -> Result<(Panel, f64),
     let points = artifact.frame_points(&given.body, frame).map_err(text)?;
     let found = artifact.frame_field(&given.body, frame, field.on, &field.name);
     let mut values = found.map_err(text)?;
+    if field.name == "nodal_distance" && field.on == On::Points {
+        values = judged_distance(artifact, &given.body, frame).unwrap_or(values);
+    }
     let each = body.nodes_per_cell as usize;
     if field.on == On::Cells {
         values = at_points(&values, &nodes, each, points.len());

@@ -9,9 +9,10 @@ use plyflow_model::artifact::ComparedBody;
 use serde::Deserialize;
 
 /// Fields that the plies of a report have under names of their own, and places.
-const KNOWN: [&str; 4] = [
+const KNOWN: [&str; 5] = [
     "shear_angle",
     "nodal_distance",
+    "judged",
     "curvature_max",
     "undeformed",
 ];

@@ -32,6 +32,18 @@ fn of_nodes(codes: [f64; 4]) -> Marked {
     }
 }
 
+/// Distances from the tool at the points of a body (m), NaN where they are not judged: there is no tool to lie on. `None` of one without distances.
+pub(crate) fn judged_distance(artifact: &Artifact, body: &str, frame: u64) -> Option<Vec<f64>> {
+    let field = |what: &str| artifact.frame_field(body, frame, On::Points, what).ok();
+    let distance = field("nodal_distance")?;
+    // A step of somebody else may judge all.
+    let Some(judged) = field("judged").filter(|j| j.len() == distance.len()) else {
+        return Some(distance);
+    };
+    let of = |(d, judged): (f64, f64)| if judged > 0.5 { d } else { f64::NAN };
+    Some(distance.into_iter().zip(judged).map(of).collect())
+}
+
 /// The plies of a `defects` or `comparison` artifact: bodies that are formed and know their flat place; of the latter with their model.
 pub(crate) fn judged_plies(path: &Utf8Path) -> Result<Vec<(Option<ComparedBody>, Ply)>, ReadError> {
     let artifact = open(path)?;
@@ -66,7 +78,7 @@ pub(crate) fn judged_plies(path: &Utf8Path) -> Result<Vec<(Option<ComparedBody>,
             flat: flat.as_chunks::<3>().0.to_vec(),
             formed,
             shear: read(On::Cells, "shear_angle"),
-            distance: read(On::Points, "nodal_distance"),
+            distance: judged_distance(&artifact, &body.name, frame),
             curvature: read(On::Points, "curvature_max"),
             deflection: None,
             marked,

@@ -3,6 +3,7 @@
 use crate::plain::{Shade, Sheet, at_points};
 use crate::read::error::{ReadError, form};
 use crate::read::facts::{last_frame, open, quads};
+use crate::read::plies::judged_distance;
 use camino::Utf8Path;
 use plyflow_artifact::{Artifact, BodyInfo, On};
 use plyflow_model::artifact::{Attributes, CensusBody, Coupon, Defects, Forming, Measurement};
@@ -69,7 +70,7 @@ pub(crate) fn read(path: &Utf8Path, source: Source) -> Result<Option<Sheet>, Rea
     let deflection = || flat.iter().zip(&points).map(|(a, b)| b[2] - a[2]).collect();
     let (shade, values) = match source {
         Source::Coupon => (Shade::Deflection, deflection()),
-        _ => match (field(On::Points, "nodal_distance"), shear) {
+        _ => match (judged_distance(&artifact, name, frame), shear) {
             (Some(d), _) if d.len() == points.len() => (Shade::Distance, d),
             (_, Some(s)) => (
                 Shade::Shear,

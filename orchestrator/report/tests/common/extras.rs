@@ -21,7 +21,20 @@ pub fn further_fields(w: &mut ArtifactWriter, name: &str, s: &Sheet, last: bool)
     }
 }
 
-pub fn history(w: &mut ArtifactWriter, press: bool) {
+/// `parts`: names of the parts of a stamping, each of which closes from 30 mm, and what it presses with at the end (N).
+pub fn history(w: &mut ArtifactWriter, press: bool, parts: &[(&str, f64)]) {
+    for (name, force) in parts {
+        let time = (0..600).map(|i| f64::from(i) / 599.0);
+        let columns: [(&str, &str, &dyn Fn(f64) -> f64); 2] = [
+            ("way", "m", &|t| 0.03 * (1.0 - t)),
+            ("force", "N", &|t| force * t * t),
+        ];
+        for (column, unit, f) in columns {
+            let data: Vec<u8> = time.clone().flat_map(|t| f(t).to_ne_bytes()).collect();
+            let path = format!("history/parts/{name}/{column}");
+            w.array(&path, DType::F64, &[600], unit, &data).unwrap();
+        }
+    }
     let n = 600;
     let time: Vec<f64> = (0..n).map(|i| f64::from(i) / f64::from(n - 1)).collect();
     type Column = (&'static str, &'static str, fn(f64) -> f64);

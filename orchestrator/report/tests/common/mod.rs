@@ -3,6 +3,7 @@
 
 mod extras;
 pub mod family;
+pub mod found;
 mod labels;
 mod shapes;
 
@@ -13,7 +14,7 @@ use plyflow_artifact::{ArtifactWriter, DType, FieldInfo, On};
 use plyflow_model::job::{Cost, NamedResult, Record};
 use plyflow_report::{Expectation, Instance, ReportInput};
 use serde_json::{Value, json};
-use shapes::{HALF, RADIUS, plies, sheet, tool};
+use shapes::{HALF, plies, sheet, tool};
 use std::f64::consts::FRAC_PI_4;
 
 /// A scene as artifacts have it: resolved, with its materials.
@@ -43,6 +44,10 @@ pub struct Study {
     pub kinetic_bound_kept: bool,
     /// Whether they are of a press.
     pub press: bool,
+    /// Whether they are of a stamping: its parts, and what each presses with at the end (N).
+    pub parts: Vec<(&'static str, f64)>,
+    /// Whether what the detection looks at reaches past the tool: there it judges no distance.
+    pub beside_tool: bool,
     /// The scene that they had; null: an artifact that tells none.
     pub scene: Value,
 }
@@ -54,6 +59,8 @@ impl Study {
             instances: Vec::new(),
             kinetic_bound_kept: true,
             press: false,
+            parts: Vec::new(),
+            beside_tool: false,
             scene: scene(),
         }
     }
@@ -153,7 +160,7 @@ impl Study {
             }
             w.end_frame().unwrap();
         }
-        history(&mut w, self.press);
+        history(&mut w, self.press, &self.parts);
         let elements: usize = sheets.iter().map(|(_, s)| s.cells.len() / 4).sum();
         let zone_json = zone.map_or(Value::Null, |(name, b)| json!({"name": name, "box": b, "free_sides": [false, false, name == "A", false]}));
         let list: Vec<Value> = sheets
@@ -193,263 +200,6 @@ impl Study {
             ("penetration_max", 2.1e-4, "m"),
         ];
         self.finish(w, (&step, &as_refs(&item)), "forming", &inputs, results);
-    }
-
-    pub fn defects(&mut self, flat_tool: bool) {
-        let mut w = self.create("detect", "defects");
-        let sheets = plies([-HALF[0], -HALF[1], HALF[0], HALF[1]], 0.004);
-        for (name, s) in &sheets {
-            w.define_mesh(name, &s.formed, 4, &s.cells, "").unwrap();
-        }
-        w.begin_frame(1.0).unwrap();
-        for (name, s) in &sheets {
-            let high = |c: &[u32]| c.iter().any(|i| s.distance[*i as usize] > 0.001) && !flat_tool;
-            let flag: Vec<f64> = s
-                .cells
-                .chunks(4)
-                .map(|c| f64::from(u8::from(high(c))))
-                .collect();
-            w.frame_points(name, &s.formed).unwrap();
-            w.frame_field(
-                name,
-                FieldInfo::new(On::Cells, "shear_angle", 1, "rad"),
-                &s.shear,
-            )
-            .unwrap();
-            w.frame_field(
-                name,
-                FieldInfo::new(On::Points, "nodal_distance", 1, "m"),
-                &s.distance,
-            )
-            .unwrap();
-            w.frame_field(
-                name,
-                FieldInfo::new(On::Points, "curvature_max", 1, "1/m"),
-                &s.curvature,
-            )
-            .unwrap();
-            w.frame_field(name, FieldInfo::new(On::Cells, "flag", 1, "1"), &flag)
-                .unwrap();
-            w.frame_field(
-                name,
-                FieldInfo::new(On::Points, "undeformed", 3, "m"),
-                &s.flat,
-            )
-            .unwrap();
-        }
-        w.end_frame().unwrap();
-        let area = if flat_tool { 0.0 } else { 0.0018 };
-        let ply = |name: &str| {
-            json!({"name": name, "flagged_area": area, "over_shear_area": 0.0, "poor_conformity_area": area,
-            "shear_min": -0.6, "shear_max": 0.4, "distance_max": 0.006})
-        };
-        let thresholds = json!({"over_shear_positive": 0.1396, "over_shear_negative": -0.8727, "distance_threshold": 0.001, "foot_margin": 0.01});
-        let attributes = json!({"thresholds": thresholds, "plies": [ply("ply_1"), ply("ply_2")]});
-        w.attributes(&attributes.to_string()).unwrap();
-        let results = vec![("flagged_area", 2.0 * area, "m2")];
-        self.finish(
-            w,
-            ("detect", &[]),
-            "defects",
-            &[("formed", "coarse")],
-            results,
-        );
-    }
-
-    pub fn zones(&mut self, zones: &[(&str, [f64; 4])]) {
-        self.zones_of("zones", &[("defects", "detect")], zones);
-    }
-
-    /// Zones by a step, from what arrives at its ports.
-    pub fn zones_of(&mut self, step: &str, inputs: &[(&str, &str)], zones: &[(&str, [f64; 4])]) {
-        let mut w = self.create(step, "zones");
-        let list: Vec<Value> = zones
-            .iter()
-            .map(|(name, b)| {
-                json!({"name": name, "box": b, "free_sides": [false, false, name == &"A", false],
-                "plies": ["ply_1", "ply_2"], "flagged_area": 0.0009})
-            })
-            .collect();
-        w.attributes(&json!({"zones": list, "scale": 1.15}).to_string())
-            .unwrap();
-        let results = vec![("zone_count", zones.len() as f64, "1")];
-        self.finish(w, (step, &[]), "zones", inputs, results);
-    }
-
-    pub fn boundary(&mut self, zone: &str) {
-        let label = format!("boundary[{zone}]");
-        let mut w = self.create(&label, "boundary");
-        w.attributes("{}").unwrap();
-        let inputs = [("formed", "coarse"), ("zones", "zones")];
-        self.finish(w, ("boundary", &[zone]), "boundary", &inputs, vec![]);
-    }
-
-    pub fn comparison(&mut self, zones: &[(&str, [f64; 4])]) {
-        self.compared("compare", ["coarse", "local"], zones, &[]);
-    }
-
-    /// A comparison by a step, of a global run and of the local runs of a step, with what else arrives at its ports.
-    pub fn compared(
-        &mut self,
-        step: &str,
-        [global, local]: [&str; 2],
-        zones: &[(&str, [f64; 4])],
-        more: &[(&str, &str)],
-    ) {
-        let mut w = self.create(step, "comparison");
-        let mut defects = Vec::new();
-        let of_model = |name: &str, role: &str, zone: Option<&str>| json!({"name": name, "role": role, "zone": zone, "element_size": 0.004, "elements": 1000, "element_cycles": 4e7});
-        let mut models = vec![of_model("global", "global", None)];
-        for (zone, bounds) in zones {
-            let model = format!("local.{zone}");
-            models.push(of_model(&model, "local", Some(zone)));
-            let (cx, cy) = ((bounds[0] + bounds[2]) / 2.0, (bounds[1] + bounds[3]) / 2.0);
-            let defect = |model: &str, ply: &str, id: String, kind: &str, length: f64| {
-                json!({"id": id, "model": model, "zone": zone, "ply": ply, "type": kind, "length": length, "amplitude": 0.0052,
-                    "area": 4.1e-4, "centre": [cx, cy], "curvature_max": 171.0, "radius": 1.0 / 171.0, "direction": if kind == "wrinkle" { json!(-0.5) } else { Value::Null },
-                    "cause": if kind == "wrinkle" { json!("bridging") } else { Value::Null }, "ridge_shear": 0.05, "ridge_shear_min": 0.02, "ridge_shear_max": 0.09, "shear_min": -0.2, "shear_max": 0.31, "touches_cut": zone == &"B",
-                    "cut_sides": [zone == &"B", false, false, false]})
-            };
-            defects.push(defect(
-                &model,
-                "ply_2",
-                format!("{zone}W1"),
-                "wrinkle",
-                0.0684,
-            ));
-            defects.push(defect(
-                "global",
-                "ply_2",
-                format!("{zone}W1"),
-                "wrinkle",
-                0.0523,
-            ));
-            defects.push(defect(
-                &model,
-                "ply_1",
-                format!("{zone}B1"),
-                "bridging",
-                0.02,
-            ));
-        }
-        for (zone, bounds) in zones {
-            for (name, s) in plies(*bounds, 0.002) {
-                let about = json!({"model": format!("local.{zone}"), "ply": name}).to_string();
-                w.define_mesh(
-                    &format!("local_{zone}_{name}"),
-                    &s.formed,
-                    4,
-                    &s.cells,
-                    &about,
-                )
-                .unwrap();
-            }
-        }
-        // An artifact without bodies has no frame.
-        if !zones.is_empty() {
-            w.begin_frame(0.0).unwrap();
-        }
-        for (zone, bounds) in zones {
-            for (name, s) in plies(*bounds, 0.002) {
-                let body = format!("local_{zone}_{name}");
-                let defect: Vec<f64> = s
-                    .distance
-                    .iter()
-                    .map(|d| f64::from(u8::from(*d > 0.002)))
-                    .collect();
-                w.frame_points(&body, &s.formed).unwrap();
-                w.frame_field(
-                    &body,
-                    FieldInfo::new(On::Points, "nodal_distance", 1, "m"),
-                    &s.distance,
-                )
-                .unwrap();
-                w.frame_field(
-                    &body,
-                    FieldInfo::new(On::Points, "curvature_max", 1, "1/m"),
-                    &s.curvature,
-                )
-                .unwrap();
-                w.frame_field(&body, FieldInfo::new(On::Points, "defect", 1, "1"), &defect)
-                    .unwrap();
-                w.frame_field(
-                    &body,
-                    FieldInfo::new(On::Points, "undeformed", 3, "m"),
-                    &s.flat,
-                )
-                .unwrap();
-                w.frame_field(
-                    &body,
-                    FieldInfo::new(On::Cells, "shear_angle", 1, "rad"),
-                    &s.shear,
-                )
-                .unwrap();
-            }
-        }
-        if !zones.is_empty() {
-            w.end_frame().unwrap();
-        }
-        w.attributes(&json!({"models": models, "defects": defects}).to_string())
-            .unwrap();
-        let locals: Vec<String> = (zones.iter())
-            .map(|z| format!("{local}[{}]", z.0))
-            .collect();
-        let mut inputs = vec![("global", global), ("zones", "zones")];
-        inputs.extend(more);
-        inputs.extend(locals.iter().map(|l| ("local", l.as_str())));
-        let results = vec![("wrinkle_count", zones.len() as f64, "1")];
-        self.finish(w, (step, &[]), "comparison", &inputs, results);
-    }
-
-    /// Defects measured on the coarse run: on ply_2 two wrinkles, the first with its crest.
-    pub fn measurement(&mut self) {
-        let mut w = self.create("measure", "measurement");
-        let sheets = plies([-HALF[0], -HALF[1], HALF[0], HALF[1]], 0.004);
-        for (name, s) in &sheets {
-            w.define_mesh(name, &s.flat, 4, &s.cells, "").unwrap();
-        }
-        w.begin_frame(1.0).unwrap();
-        for (name, s) in &sheets {
-            let number = |(i, d): (usize, &f64)| match (*d > 0.002, s.flat[3 * i] < 0.0) {
-                (true, true) => 1.0,
-                (true, false) => 2.0,
-                _ => 0.0,
-            };
-            let defect: Vec<f64> = s.distance.iter().enumerate().map(number).collect();
-            w.frame_points(name, &s.formed).unwrap();
-            w.frame_field(name, FieldInfo::new(On::Points, "defect", 1, "1"), &defect)
-                .unwrap();
-            if *name == "ply_2" {
-                let along: Vec<f64> = s.flat.chunks_exact(3).map(|p| 0.01 * p[1]).collect();
-                w.frame_field(
-                    name,
-                    FieldInfo::new(On::Points, "slip_along", 1, "m"),
-                    &along,
-                )
-                .unwrap();
-            }
-        }
-        w.end_frame().unwrap();
-        let r = RADIUS + 0.008;
-        let ridge: Vec<[f64; 3]> = (0..9)
-            .map(|k| (-0.055 + 0.0025 * f64::from(k)) / RADIUS)
-            .map(|a| [-0.05, r * a.sin(), r * a.cos()])
-            .collect();
-        let defect = |number: u32, ridge: &[[f64; 3]]| {
-            json!({"on": "ply_2", "number": number, "type": "wrinkle", "length": 0.021, "amplitude": 0.0052, "area": 4.1e-4,
-            "centre": [0.0, 0.0], "ridge": ridge})
-        };
-        let columns = [
-            json!({"label": "defect"}),
-            json!({"label": "length", "unit": "m"}),
-        ];
-        let table = json!({"name": "defects", "title": "Measured defects", "columns": columns,
-            "rows": [["1", 0.021], ["2", 0.018]]});
-        let about = json!({"defects": [defect(1, &ridge), defect(2, &[])], "tables": [table]});
-        w.attributes(&about.to_string()).unwrap();
-        let inputs = [("formed", "coarse")];
-        let results = vec![("wrinkle_count", 2.0, "1")];
-        self.finish(w, ("measure", &[]), "measurement", &inputs, results);
     }
 
     /// An artifact of a kind that this crate does not know.
@@ -527,7 +277,7 @@ impl Study {
             let n = values.len() as u64;
             w.array(path, DType::F64, &[n], unit, &bytes).unwrap();
         }
-        history(&mut w, false);
+        history(&mut w, false, &[]);
         let energy = json!({"peak_drift_ratio": 0.004, "hourglass_ratio": 0.0123});
         w.attributes(
             &json!({

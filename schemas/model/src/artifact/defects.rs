@@ -67,6 +67,9 @@ pub struct PlyDefects {
     pub shear_max: f64,
     /// Largest distance of a judged node from the tool, less the ply's offset (m).
     pub distance_max: f64,
+    /// Share of the ply's undeformed area whose distance from the tool is judged (1): there is tool to lie on. Left out: not told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub judged_share: Option<f64>,
     /// Of a ply that is not draped everywhere: undeformed area that has no shape (m2), of which nothing is in the other numbers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub undraped_area: Option<f64>,

@@ -345,8 +345,9 @@ fn press(pressed: &Pressed, path: &Path, end: f64, found: &mut Vec<Fault>) {
         let fault = Fault::text(Rule::Press, path.key("force"), text);
         found.push(fault.help("give a force of more than 0 N, or a `spring`"));
     }
-    if !(pressed.travel.si() >= 0.0 && pressed.travel.si().is_finite()) {
-        let fault = Fault::given(Rule::Press, path.key("travel"), mm(pressed.travel.si()));
+    let travel = pressed.travel.map(|t| t.si());
+    if let Some(travel) = travel.filter(|t| !(*t >= 0.0 && t.is_finite())) {
+        let fault = Fault::given(Rule::Press, path.key("travel"), mm(travel));
         found.push(fault.expected("0 mm or more"));
     }
     if let Some(mass) = pressed

@@ -1,10 +1,11 @@
 //! Tool and plies of a formed run: the same for every step that measures defects.
 
 use crate::{Neighbour, Ply, Shape, Tool};
+use plyflow_model::artifact::Forming;
 pub use plyflow_model::artifact::Sheet;
 use plyflow_sdk::{Host, Input, Meshes, StepError};
 use plyflow_surface::draped::Formed;
-use plyflow_surface::{Topology, of_run};
+use plyflow_surface::{Ground, Topology, of_run};
 
 /// The plies next to the one at place `k` of which the run tells the fibre directions, as [`crate::find_causes`] asks for them. `plies`: as many
 /// as `sheets`, in the order of the stack.
@@ -23,6 +24,14 @@ pub fn neighbours<'a>(sheets: &[Sheet], plies: &'a [Ply], k: usize) -> Vec<Neigh
 /// When the run has none, or one without a triangle with an area.
 pub fn tool(host: &Host, input: &Input) -> Result<Tool, StepError> {
     of_run::rigid(host, input, "tool").map(Tool::new)
+}
+
+/// Where there is tool to lie on in a run ([`Ground`]).
+pub fn ground(run: &Forming, foot_margin: f64) -> Ground {
+    Ground {
+        foot_margin,
+        bed: !run.without_bed,
+    }
 }
 
 /// Number of the last frame of a run.
@@ -79,7 +88,7 @@ fn part_of_ply(
         },
         tool,
         offset,
-        foot_margin,
+        ground(&host.attributes(input)?, foot_margin),
     );
     if let Some(missing) = of_run::missing_below(host, input, name)? {
         ply.lower(&formed.at_nodes(missing));

@@ -2,7 +2,8 @@
 
 use plyflow_geometry::vec3::{Vec3, cross, dot, scale, sub, unit};
 use plyflow_surface::{
-    Crests, Curvature, NodalDistance, Surface, Topology, curvatures, nodal_distances,
+    Crests, Curvature, Ground, NodalDistance, Surface, Topology, curvatures, judged_share,
+    nodal_distances,
 };
 
 /// A formed ply: of a simulation, or scanned.
@@ -61,13 +62,13 @@ impl Ply {
     /// Takes distances and curvatures of a ply whose mid-plane lies `offset` (m) from the tool when all sheets
     /// lie on it. Nothing is known of its strains ([`Ply::shear_angle`], [`Ply::fibre_strain`]). Cells may be wound either way, all alike: what is a crest
     /// is told by the side on which the tool lies.
-    pub fn new(name: String, shape: Shape, tool: &Tool, offset: f64, foot_margin: f64) -> Self {
+    pub fn new(name: String, shape: Shape, tool: &Tool, offset: f64, ground: Ground) -> Self {
         let Shape {
             topology,
             undeformed,
             formed,
         } = shape;
-        let distance = nodal_distances(&tool.surface, &formed, offset, foot_margin);
+        let distance = nodal_distances(&tool.surface, &topology, &formed, offset, ground);
         let mut curvature = curvatures(&topology, &formed);
         if faces(&topology, &formed, &tool.surface, &distance) {
             curvature.iter_mut().for_each(turn_over);
@@ -97,6 +98,17 @@ impl Ply {
             .map(|&c| field.get(c as usize))
             .sum::<Option<f64>>()?;
         (!cells.is_empty()).then(|| sum / cells.len() as f64)
+    }
+
+    /// `[nodes]`: 1 where the distance from the tool is judged, 0 elsewhere.
+    pub fn judged(&self) -> Vec<f64> {
+        let judged = self.distance.iter().map(|d| d.judged);
+        judged.map(|j| f64::from(u8::from(j))).collect()
+    }
+
+    /// Share of its area in the flat ply whose distance from the tool is judged.
+    pub fn judged_share(&self) -> f64 {
+        judged_share(&self.distance, &self.topology.node_areas(&self.undeformed))
     }
 
     /// Takes account of plies below that do not lie under all of its nodes: by node, what (m) of its offset is not there.

@@ -2,7 +2,7 @@
 
 use plyflow_defects::{FieldErrors, Ply, Shape, Tool};
 use plyflow_geometry::vec3::Vec3;
-use plyflow_surface::{Surface, Topology};
+use plyflow_surface::{Ground, Surface, Topology};
 
 /// The tool: a plane.
 const TOP: f64 = 0.060;
@@ -37,7 +37,7 @@ fn errors_of_fields_count_by_area() {
             undeformed: flat,
             formed,
         };
-        Ply::new("ply".into(), shape, &tool(), OFFSET, 0.0)
+        Ply::new("ply".into(), shape, &tool(), OFFSET, Ground::bed(0.0))
     };
     let uneven: Vec<f64> = (-100..0)
         .map(|i| 0.001 * f64::from(i))

@@ -4,7 +4,7 @@ mod common;
 
 use plyflow_geometry::vec3::{Vec3, distance, norm, scale};
 use plyflow_geometry::{Feature, QuadLocator, TriangleTree};
-use plyflow_surface::{Surface, Topology, nodal_distances, triangles};
+use plyflow_surface::{Ground, Surface, Topology, nodal_distances, triangles};
 
 fn brute_force(points: &[Vec3], tris: &[[u32; 3]], p: Vec3) -> f64 {
     // Projected gradient over barycentric coordinates is slow; sample the sides finely and the plane exactly.
@@ -133,7 +133,9 @@ fn nodes_past_the_rim_or_at_the_foot_are_not_judged() {
     });
     let tool = Surface::new(&points, &triangles(4, &cells)).unwrap();
     let nodes = [[0.0, 0.0, 0.0325], [0.2, 0.0, 0.0], [0.0, 0.0499, 0.002]];
-    let found = nodal_distances(&tool, &nodes, 0.0005, 0.010);
+    // On a bed no normals are asked for.
+    let none = Topology::new(nodes.len(), 3, &[]);
+    let found = nodal_distances(&tool, &none, &nodes, 0.0005, Ground::bed(0.010));
     assert!(
         found[0].judged && (found[0].value - 0.002).abs() < 1e-9,
         "{found:?}"

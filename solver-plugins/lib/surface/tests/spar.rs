@@ -2,7 +2,7 @@
 
 use plyflow_geometry::vec3::{add, cross, norm, scale, sub, unit};
 use plyflow_model::scene::Tool;
-use plyflow_surface::{Surface, nodal_distances, tool_crests};
+use plyflow_surface::{Ground, Surface, Topology, nodal_distances, tool_crests};
 
 fn spar() -> plyflow_tooling::ToolMesh {
     let tool: Tool = serde_json::from_value(serde_json::json!({"joggle_spar": {
@@ -28,7 +28,10 @@ fn a_sheet_offset_from_the_spar_conforms_and_one_lifted_off_it_does_not() {
         mesh.triangles.iter().map(above).collect::<Vec<_>>()
     };
     for height in [offset, offset + 0.002, -0.003] {
-        let found = nodal_distances(&tool, &lift(height), offset, 0.010);
+        let nodes = lift(height);
+        // On a bed no normals are asked for.
+        let none = Topology::new(nodes.len(), 3, &[]);
+        let found = nodal_distances(&tool, &none, &nodes, offset, Ground::bed(0.010));
         let judged = found.iter().filter(|d| d.judged).count();
         assert!(judged > found.len() / 2, "{judged} of {}", found.len());
         // Facets are chords of 0.02 mm: in a valley a neighbour is that much nearer.

@@ -20,34 +20,74 @@ const SHEAR_LIMIT: f64 = std::f64::consts::FRAC_PI_3;
 
 /// A material with its curves and all its parameters.
 pub(super) fn drawn(law: &Law) -> Markup {
-    let plots = match law.plugin.as_str() {
-        "material-fabric" => fabric(&law.with),
-        "material-marlow" => film(&law.with),
-        _ => Vec::new(),
-    };
+    let plots = plots(&law.plugin, &law.with);
     html! {
         h4 { "Material " (law.name) }
         p class="note" { "Of " (law.sheets.join(", ")) "; plugin " code { (law.plugin) } "."
             @if let Some(source) = &law.source { " Source: " (source) "." }
-            @for (name, value) in constants(law) { " " (name) ": " (value) "." } }
+            @for (name, value) in constants(&law.with) { " " (name) ": " (value) "." } }
         @if !plots.is_empty() { div class="row laws" { @for plot in &plots { (plot.svg()) } } }
         details open[plots.is_empty()] { summary { "All parameters (SI)" } pre { code { (format!("{:#}", law.with)) } } }
     }
 }
 
+/// The plots of a plugin's law; none of one that is not built in.
+fn plots(plugin: &str, with: &Value) -> Vec<Plot<'static>> {
+    match plugin {
+        "material-fabric" => fabric(with),
+        "material-marlow" => film(with),
+        _ => Vec::new(),
+    }
+}
+
+/// A curve that the report draws of a material, as [`curves`] gives it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LawCurve {
+    /// Title of its plot.
+    pub plot: String,
+    /// Its name in the legend; empty where the plot has one curve alone.
+    pub name: String,
+    /// `[places]`, in the unit of the axis: deg, 1/mm or per cent.
+    pub x: Vec<f64>,
+    /// `[places]`, in the unit of the axis: N/m, N or MPa.
+    pub y: Vec<f64>,
+}
+
+/// What the report draws of a material of the plugin `plugin` with these parameters (SI), to be held against the law itself; and what it tells in words.
+pub fn curves(plugin: &str, with: &Value) -> (Vec<LawCurve>, Vec<(&'static str, String)>) {
+    let of = |plot: Plot<'static>| {
+        let title = plot.title.into_owned();
+        let series = plot.series.into_iter();
+        series.map(move |s| LawCurve {
+            plot: title.clone(),
+            name: s.name.into_owned(),
+            x: s.x.into_owned(),
+            y: s.y.into_owned(),
+        })
+    };
+    let all = plots(plugin, with).into_iter().flat_map(of).collect();
+    (all, constants(with))
+}
+
 /// What a curve does not show.
-fn constants(law: &Law) -> Vec<(&'static str, String)> {
-    let of = |key: &str, factor: f64, unit: &str| {
-        let value = law.with[key].as_f64()?;
-        Some(format!("{} {unit}", number(value * factor, 4)))
+fn constants(with: &Value) -> Vec<(&'static str, String)> {
+    let of = |key: &str| with[key].as_f64();
+    // Across the fibres of a unidirectional ply it is a thousandth.
+    let modulus = |key: &str| {
+        let value = of(key)?;
+        Some(match value {
+            v if v < 1e8 => format!("{} MPa", number(v * 1e-6, 4)),
+            v => format!("{} GPa", number(v * 1e-9, 4)),
+        })
     };
     let all = [
-        ("Modulus along the fibres", of("fibre_modulus", 1e-9, "GPa")),
+        ("Modulus along the fibres", modulus("fibre_modulus")),
+        ("Modulus of the second family", modulus("fibre_modulus_2")),
         (
             "Share of it in compression",
-            of("compression_factor", 1.0, "").map(|v| v.trim().to_owned()),
+            of("compression_factor").map(|v| number(v, 4)),
         ),
-        ("Young's modulus", of("youngs_modulus", 1e-9, "GPa")),
+        ("Young's modulus", modulus("youngs_modulus")),
     ];
     all.into_iter()
         .filter_map(|(name, v)| Some((name, v?)))

@@ -178,6 +178,7 @@ fn write_ply<'a>(
     host.write_points(body, &p.formed)?;
     let distance: Vec<f64> = p.distance.iter().map(|d| d.value).collect();
     field("nodal_distance", 1, "m", &distance)?;
+    field("judged", 1, "1", &p.judged())?;
     let curvature: Vec<f64> = p.curvature.iter().map(|k| k.max).collect();
     field("curvature_max", 1, "1/m", &curvature)?;
     let mut kind = vec![0.0; p.formed.len()];

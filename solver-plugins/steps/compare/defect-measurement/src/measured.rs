@@ -46,3 +46,20 @@ pub fn check_names<'a>(what: &str, names: impl Iterator<Item = &'a str>) -> Resu
     }
     Ok(())
 }
+
+/// What is said under the distances of plies of which not all is judged.
+pub fn not_judged(measured: &[Measured]) -> Option<String> {
+    let open = measured
+        .iter()
+        .map(|m| (&m.ply.name, 1.0 - m.ply.judged_share()));
+    let open = open.filter(|(_, share)| *share > 1e-9);
+    let open: Vec<String> = open
+        .map(|(name, share)| format!("{:.1} % of {name}", 100.0 * share))
+        .collect();
+    (!open.is_empty()).then(|| {
+        format!(
+            "Not in it, as there is no tool to lie on (at its foot, past an edge of it, over a hole in it): {}.",
+            open.join(", ")
+        )
+    })
+}

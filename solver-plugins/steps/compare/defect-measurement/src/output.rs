@@ -2,7 +2,7 @@
 
 use crate::agreement::{self, Agreement};
 use crate::compression;
-use crate::measured::{Measured, SCAN, columns};
+use crate::measured::{Measured, SCAN, columns, not_judged};
 use crate::read::{Beside, Run};
 use crate::region::Regions;
 use crate::sections::{Section, Sheet};
@@ -115,6 +115,7 @@ impl<'a> Output<'a> {
             };
             let distance: Vec<f64> = p.distance.iter().map(|d| d.value).collect();
             field("nodal_distance", "m", &distance)?;
+            field("judged", "1", &p.judged())?;
             let curvature: Vec<f64> = p.curvature.iter().map(|k| k.max).collect();
             field("curvature_max", "1/m", &curvature)?;
             let mut number = vec![0.0; p.formed.len()];
@@ -148,6 +149,7 @@ impl<'a> Output<'a> {
         let mut series = Vec::new();
         for m in self.measured {
             let p = &m.ply;
+            host.result(&format!("judged_share.{}", p.name), p.judged_share(), "1")?;
             let areas = p.topology.node_areas(&p.undeformed);
             let judged = p.distance.iter().zip(&areas);
             let weights: Vec<f64> = judged
@@ -177,7 +179,7 @@ impl<'a> Output<'a> {
         self.plots.push(Plot {
             name: "distance_density".into(),
             title: Some("Distance from the tool, by area".into()),
-            note: None,
+            note: not_judged(self.measured),
             x: Axis::new("distance", "mm"),
             y: Axis::new("probability density", "1/mm"),
             series,

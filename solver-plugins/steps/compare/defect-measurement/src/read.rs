@@ -10,7 +10,7 @@ use plyflow_model::artifact::{Forming, Sheet};
 use plyflow_sdk::{Host, Input, Log, StepError};
 use plyflow_surface::draped;
 use plyflow_surface::of_run::Stack;
-use plyflow_surface::{Closest, Surface, Topology, triangles};
+use plyflow_surface::{Closest, Ground, Surface, Topology, triangles};
 use std::path::Path;
 
 /// A formed run.
@@ -23,6 +23,8 @@ pub struct Run {
     pub tool: Tool,
     /// The plies, from the tool upwards.
     pub plies: Vec<Sheet>,
+    /// Whether there is no bed under its tool.
+    without_bed: bool,
     /// Distance of the outer face of the uppermost sheet from the tool (m).
     outer: f64,
 }
@@ -36,6 +38,7 @@ impl Run {
         let frame = of_run::last_frame(&input, &meshes)?;
         let faces = formed.sheets.iter().map(|s| s.offset + 0.5 * s.thickness);
         let outer = faces.fold(0.0, f64::max);
+        let without_bed = formed.without_bed;
         let plies: Vec<Sheet> = (formed.sheets.into_iter()).filter(Sheet::is_ply).collect();
         if plies.is_empty() {
             return Err(format!(
@@ -49,6 +52,7 @@ impl Run {
             time: meshes.times[frame],
             tool: of_run::tool(host, &input)?,
             plies,
+            without_bed,
             outer,
             input,
         })
@@ -239,7 +243,11 @@ impl Scan {
             undeformed: points.clone(),
             formed: points,
         };
-        let mut ply = Ply::new(SCAN.to_owned(), shape, &run.tool, offset, foot_margin);
+        let ground = Ground {
+            foot_margin,
+            bed: !run.without_bed,
+        };
+        let mut ply = Ply::new(SCAN.to_owned(), shape, &run.tool, offset, ground);
         ply.lower(&missing);
         Ok(Self {
             ply,

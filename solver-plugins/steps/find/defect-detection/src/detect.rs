@@ -2,7 +2,9 @@
 
 use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{PlyDefects, ShearLimits};
-use plyflow_surface::{Surface, Topology, curvatures, nodal_distances};
+use plyflow_surface::{
+    Ground, NodalDistance, Surface, Topology, curvatures, judged_share, nodal_distances,
+};
 use serde::Deserialize;
 
 /// When a place counts as a defect.
@@ -47,6 +49,8 @@ pub struct Ply<'a> {
     pub offset: f64,
     /// `[nodes]` what of that is not there, because plies below end beside it (m); `None`: all is there.
     pub missing: Option<&'a [f64]>,
+    /// Whether there is a machine bed under the tool.
+    pub bed: bool,
 }
 
 /// What was found on a ply.
@@ -54,6 +58,8 @@ pub struct Ply<'a> {
 pub struct Detection {
     /// `[nodes]` (m).
     pub nodal_distance: Vec<f64>,
+    /// `[nodes]`: whether that is judged.
+    pub judged: Vec<bool>,
     /// `[nodes]` principal curvature of largest magnitude (1/m).
     pub curvature_max: Vec<f64>,
     /// `[cells]`.
@@ -66,13 +72,23 @@ pub struct Detection {
     pub summary: PlyDefects,
 }
 
-/// Judges a ply against the tool.
-pub fn detect(tool: &Surface, ply: &Ply<'_>, thresholds: &Thresholds) -> Detection {
-    let t = thresholds;
-    let mut distances = nodal_distances(tool, ply.formed, ply.offset, t.foot_margin);
+/// Distances of the nodes from the tool, less what of their offset is not there.
+fn distances(tool: &Surface, ply: &Ply<'_>, foot_margin: f64) -> Vec<NodalDistance> {
+    let ground = Ground {
+        foot_margin,
+        bed: ply.bed,
+    };
+    let mut distances = nodal_distances(tool, ply.topology, ply.formed, ply.offset, ground);
     for (distance, missing) in distances.iter_mut().zip(ply.missing.unwrap_or_default()) {
         distance.value += missing;
     }
+    distances
+}
+
+/// Judges a ply against the tool.
+pub fn detect(tool: &Surface, ply: &Ply<'_>, thresholds: &Thresholds) -> Detection {
+    let t = thresholds;
+    let distances = distances(tool, ply, t.foot_margin);
     let poor_conformity: Vec<bool> = distances
         .iter()
         .map(|d| d.judged && d.value > t.distance_threshold)
@@ -100,6 +116,7 @@ pub fn detect(tool: &Surface, ply: &Ply<'_>, thresholds: &Thresholds) -> Detecti
         angles.reduce(pick).unwrap_or(0.0)
     };
     let judged = distances.iter().filter(|d| d.judged).map(|d| d.value);
+    let nodes = ply.topology.node_areas(ply.undeformed);
     let summary = PlyDefects {
         name: ply.name.to_owned(),
         flagged_area: area(&flag),
@@ -109,6 +126,7 @@ pub fn detect(tool: &Surface, ply: &Ply<'_>, thresholds: &Thresholds) -> Detecti
         shear_min: shear(f64::min),
         shear_max: shear(f64::max),
         distance_max: judged.reduce(f64::max).unwrap_or(0.0),
+        judged_share: Some(judged_share(&distances, &nodes)),
         undraped_area: None,
         locked_area: None,
         buckling_area: None,
@@ -116,6 +134,7 @@ pub fn detect(tool: &Surface, ply: &Ply<'_>, thresholds: &Thresholds) -> Detecti
     };
     Detection {
         nodal_distance: distances.iter().map(|d| d.value).collect(),
+        judged: distances.iter().map(|d| d.judged).collect(),
         curvature_max: curvatures(ply.topology, ply.formed)
             .iter()
             .map(|k| k.max)

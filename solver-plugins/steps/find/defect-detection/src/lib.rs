@@ -113,7 +113,14 @@ impl Step for DefectDetection {
                 phase: &sheet.name,
                 ..Default::default()
             });
-            judged.push(judge(host, &input, frame, sheet, &tool, &p.thresholds)?);
+            let bed = !formed.without_bed;
+            judged.push(judge(
+                host,
+                (&input, frame),
+                sheet,
+                (&tool, bed),
+                &p.thresholds,
+            )?);
         }
         if let Some(scene) = &p.scene {
             let found = buckling::judge(host, &input, frame, scene, p.ruck_height)?;
@@ -137,10 +144,9 @@ impl Step for DefectDetection {
 
 fn judge(
     host: &Host,
-    input: &Input,
-    frame: usize,
+    (input, frame): (&Input, usize),
     sheet: &Sheet,
-    tool: &Surface,
+    (tool, bed): (&Surface, bool),
     thresholds: &Thresholds,
 ) -> Result<Judged, StepError> {
     let meshes = host.meshes(input)?;
@@ -161,6 +167,7 @@ fn judge(
         shear_angle: &shear_angle,
         over_shear: shear::limits(sheet, thresholds.asked()),
         offset: sheet.offset,
+        bed,
     };
     let found = detect(tool, &ply, thresholds);
     let area = topology.cell_areas(&part.flat).iter().sum();
@@ -202,6 +209,7 @@ impl Judged {
         let f = &mut self.found;
         self.shear_angle = part.to_cells(&self.shear_angle, 0.0);
         f.nodal_distance = part.to_nodes(nodes, &f.nodal_distance, 0.0);
+        f.judged = part.to_nodes(nodes, &f.judged, false);
         f.curvature_max = part.to_nodes(nodes, &f.curvature_max, 0.0);
         f.poor_conformity = part.to_nodes(nodes, &f.poor_conformity, false);
         f.over_shear = part.to_cells(&f.over_shear, false);
@@ -260,6 +268,8 @@ fn write_ply(host: &Host, p: &Judged) -> Result<(), StepError> {
         "m",
         &f.nodal_distance,
     )?;
+    let judged = number(&f.judged);
+    host.write_field(&p.name, On::Points, "judged", 1, "1", &judged)?;
     host.write_field(
         &p.name,
         On::Points,
@@ -321,6 +331,15 @@ fn shear_area(host: &Host, plies: &[Judged]) -> Result<(), StepError> {
     }
 }
 
+/// By ply, the share whose distance from the tool is judged.
+fn judged_shares(host: &Host, plies: &[Judged]) -> Result<(), StepError> {
+    for p in plies {
+        let share = p.found.summary.judged_share.unwrap_or(0.0);
+        host.result(&format!("judged_share.{}", p.name), share, "1")?;
+    }
+    Ok(())
+}
+
 fn write(
     host: &Host,
     time: f64,
@@ -357,6 +376,7 @@ fn write(
         host.result("buckling_excess", most, "1")?;
     }
     shear_area(host, plies)?;
+    judged_shares(host, plies)?;
     host.result(
         "poor_conformity_area",
         all(|s| s.poor_conformity_area).sum(),

@@ -113,6 +113,37 @@ fn flat_ply_on_a_flat_tool_has_no_defect() {
 }
 
 #[test]
+fn a_ply_beside_a_tool_without_a_bed_is_not_flagged_and_the_share_is_told() {
+    // Flat, and moved along the block of 300 mm until its last 49 mm of 200 mm lie past it.
+    let mut input = formed(|_, _| OFFSET, |_| 0.0);
+    for p in &mut input.bodies[1].frames[1] {
+        p[0] += 0.099;
+    }
+    let bridging = detect(&input);
+    assert!((bridging.result("poor_conformity_area") - 0.050 * 0.100).abs() < 1e-9);
+    assert!((bridging.result("judged_share.ply_1") - 1.0).abs() < 1e-12);
+    input.attributes["without_bed"] = json!(true);
+    let found = detect(&input);
+    assert_eq!(found.result("poor_conformity_area"), 0.0);
+    assert_eq!(found.result("flagged_area"), 0.0);
+    assert!(found.result("distance_max").abs() < 1e-12);
+    // Nodes at each 10 mm: the last five of 21 rows, of which the outermost stands for half as much.
+    let share = 1.0 - 4.5 / 20.0;
+    assert!((found.result("judged_share.ply_1") - share).abs() < 1e-12);
+    assert_eq!(
+        found.attributes["plies"][0]["judged_share"],
+        json!(found.result("judged_share.ply_1"))
+    );
+    let (judged, points) = (
+        found.body("ply_1").last("judged"),
+        &input.bodies[1].frames[1],
+    );
+    for (judged, p) in judged.iter().zip(points) {
+        assert_eq!(*judged, f64::from(u8::from(p[0] < 0.15)), "{p:?}");
+    }
+}
+
+#[test]
 fn blank_that_hangs_over_the_rim_onto_the_bed_has_no_poor_conformity() {
     // The block is 300 mm long: moved by 100 mm, the ply's last 50 mm lie past it, half-way down and on
     // the bed.

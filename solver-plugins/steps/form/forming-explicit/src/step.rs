@@ -73,6 +73,9 @@ fn build(host: &Host, p: &Parameters) -> Result<Forming> {
     if let Some(placement) = &forming.placement {
         host.log(Log::Info, &given::placement_told(placement));
     }
+    for what in forming.load.stamping().iter().flat_map(|s| &s.stops) {
+        host.log(Log::Info, what);
+    }
     for what in at_the_start(&forming) {
         host.log(Log::Warn, &what);
     }

@@ -387,6 +387,7 @@ fn forming(p: &Parameters, done: &[Done], elements: u64, of_tool: OfTool) -> For
         scene: Some(p.scene.name.clone()),
         sheets: done.iter().map(sheet).collect(),
         contact_by_place: false,
+        without_bed: p.scene.process.is_without_bed(),
         symmetry: None,
         element_size: p.element_size,
         net_spacing: Some(p.net_spacing.unwrap_or(0.25 * p.element_size)),

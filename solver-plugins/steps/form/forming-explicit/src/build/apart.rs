@@ -233,12 +233,7 @@ impl Apart<'_> {
         let allowed = one.error.largest + other.error.largest + TOUCH;
         let mut worst: Option<Nearest> = None;
         for (a, b) in [(one, other), (other, one)] {
-            let (places, bounds) = (places(&a.mesh), b.mesh.bounds());
-            // The walls of a field go on behind the part's back.
-            let behind = |p: Vec3| match b.side {
-                Side::Below => p[2] < bounds[0][2],
-                Side::Above => p[2] > bounds[1][2],
-            };
+            let places = places(&a.mesh);
             for t in &times {
                 let (from, to) = (a.shift(*t), b.shift(*t));
                 if *t > 0.0 && from == a.shift(0.0) && to == b.shift(0.0) {
@@ -246,7 +241,7 @@ impl Apart<'_> {
                 }
                 for p in &places {
                     let at = add(*p, from);
-                    if behind(sub(at, to)) {
+                    if behind(b, sub(at, to)) {
                         continue;
                     }
                     let distance = b.field.distance_and_gradient(sub(at, to)).0;
@@ -271,8 +266,17 @@ impl Apart<'_> {
     }
 }
 
+/// Whether a place is behind the back of a part as it is drawn, where the walls of its field go on and the part does not.
+pub fn behind(part: &Drawn, p: Vec3) -> bool {
+    let bounds = part.mesh.bounds();
+    match part.side {
+        Side::Below => p[2] < bounds[0][2],
+        Side::Above => p[2] > bounds[1][2],
+    }
+}
+
 /// Corners of facets, and places on those that are large.
-fn places(mesh: &ToolMesh) -> Vec<Vec3> {
+pub fn places(mesh: &ToolMesh) -> Vec<Vec3> {
     let mut all = mesh.points.clone();
     for t in 0..mesh.triangles.len() {
         let [a, b, c] = mesh.corners(t);

@@ -5,7 +5,7 @@ use crate::request::Parameters;
 use crate::stack::RigidName;
 use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::history::MonotoneCubic;
-use plyflow_model::scene::{PartMotion, Side, Stamping, StampingPart};
+use plyflow_model::scene::{PartMotion, Pressed, Side, Stamping, StampingPart};
 use plyflow_model::stamping::TOOL;
 use plyflow_tooling::{FieldError, PartField, SignedDistanceGrid, ToolMesh, part};
 use std::sync::Arc;
@@ -33,10 +33,17 @@ impl Drawn {
         self.words.as_ref().map_or(away, StampingPart::outwards)
     }
 
+    /// What presses it, of one that is pressed.
+    pub fn pressed(&self) -> Option<&Pressed> {
+        match self.words.as_ref()?.motion.as_ref()? {
+            PartMotion::Pressed(pressed) => Some(pressed),
+            PartMotion::Table(_) => None,
+        }
+    }
+
     /// Whether what the plies do decides where it is.
     pub fn is_pressed(&self) -> bool {
-        let motion = self.words.as_ref().and_then(|w| w.motion.as_ref());
-        matches!(motion, Some(PartMotion::Pressed(_)))
+        self.pressed().is_some()
     }
 
     /// Its table, of one that follows one: way (m) over time (s).

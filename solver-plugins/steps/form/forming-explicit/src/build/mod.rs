@@ -10,6 +10,7 @@ pub mod layout;
 pub mod plates;
 pub mod press;
 pub mod stamping;
+pub mod travel;
 pub mod zone;
 
 pub use feedback::feed_back;

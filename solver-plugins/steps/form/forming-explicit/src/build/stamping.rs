@@ -5,6 +5,7 @@
 use crate::build::apart::{Apart, Reach, check_apart, check_reach};
 use crate::build::drawn::{Drawn, drawn};
 use crate::build::press::add_contacts;
+use crate::build::travel::{Stop, stop};
 use crate::error::{FormingError, Result};
 use crate::forming::Forming;
 use crate::load::{ForceInTime, Grip, Load, Motion, MovedPart, PressedPart, StampingLoad};
@@ -53,19 +54,24 @@ pub fn build_stamping(
     let mut model = Model::mirrored(parts.points, parts.specs, p.step_settings(), parts.mirrors)?;
     model.set_body_acceleration([0.0, 0.0, fall(stamping.weight)]);
     let rigid: Vec<RigidPart> = drawn.iter().map(contact_part).collect();
+    let end = stamping.forming_time.si();
+    let stops = stops(&drawn, end);
     add_contacts(&mut model, &stack, parts.placed, &rigid, p)?;
     model.add_plane_contacts(&p.contact_settings());
     let mut load = StampingLoad {
-        forming: stamping.forming_time.si(),
+        forming: end,
         settling: stamping.settling_time.si(),
-        parts: moved(&drawn, &model),
+        parts: moved(&drawn, &stops, &model),
         grips: grips(stamping, &model, p.time_step)?,
+        stops: told_stops(&drawn, &stops),
     };
     put(&load, &mut model);
     load.apply(&mut model, 0.0);
     let reference = model.start().clone();
     let errors = drawn.iter().map(|d| (d.name.clone(), d.error));
     let field_errors = errors.collect();
+    let mut tool_warnings = tool.warnings;
+    tool_warnings.extend(without_partner(&drawn, &stops));
     Ok(Forming {
         model,
         load: Load::Stamping(load),
@@ -76,7 +82,7 @@ pub fn build_stamping(
         rigid: drawn.into_iter().filter_map(body).collect(),
         field_errors,
         placement: tool.placement,
-        tool_warnings: tool.warnings,
+        tool_warnings,
         zone: None,
         slower: 1.0,
         start: None,
@@ -157,30 +163,83 @@ fn blank_height(stamping: &Stamping, parts: &[Drawn], reach: &Reach) -> Result<f
     }
 }
 
-/// How the parts move.
-fn moved(parts: &[Drawn], model: &Model) -> Vec<MovedPart> {
+/// Where the parts stop that are pressed; none of others.
+fn stops(parts: &[Drawn], end: f64) -> Vec<Option<Stop>> {
+    let of = |(k, part): (usize, &Drawn)| {
+        let travel = part.pressed()?.travel;
+        Some(match travel {
+            Some(travel) => Stop {
+                travel: travel.si(),
+                meets: None,
+            },
+            None => stop(parts, k, end),
+        })
+    };
+    parts.iter().enumerate().map(of).collect()
+}
+
+/// What is told of stops that the scene leaves out.
+fn told_stops(parts: &[Drawn], stops: &[Option<Stop>]) -> Vec<String> {
+    let told = |(part, stop): (&Drawn, &Option<Stop>)| {
+        let stop = stop.as_ref()?;
+        let meets = stop.meets.as_ref()?;
+        Some(format!(
+            "process.stamping: the part `{}` is pressed and has no `travel`: it may go {:.3} mm beyond the place where it is drawn, where it meets `{meets}`",
+            part.name.word(),
+            1e3 * stop.travel
+        ))
+    };
+    parts.iter().zip(stops).filter_map(told).collect()
+}
+
+/// What is told of parts without `travel` that no part stops.
+fn without_partner(parts: &[Drawn], stops: &[Option<Stop>]) -> Vec<String> {
+    let alone = |(part, stop): (&Drawn, &Option<Stop>)| {
+        let open = part.pressed()?.travel.is_none();
+        (open && stop.as_ref()?.meets.is_none()).then(|| {
+            format!(
+                "the part `{}` is pressed, and no part is on the other side of the plies to stop it: it goes no further than where it is drawn. Say with \
+                 `travel` how far it may go beyond",
+                part.name.word()
+            )
+        })
+    };
+    parts.iter().zip(stops).filter_map(alone).collect()
+}
+
+/// How the parts move. `stops`: by part, where it stops if it is pressed.
+fn moved(parts: &[Drawn], stops: &[Option<Stop>], model: &Model) -> Vec<MovedPart> {
     let copies = model.planes().copies() as f64;
     let plies: f64 = model.mass().iter().sum();
     let pressed = parts.iter().filter(|p| p.is_pressed()).count().max(1);
     let usual = plies * (PRESSED_MASS / pressed as f64).max(1.0);
-    let motion = |part: &Drawn| match part.words.as_ref().and_then(|w| w.motion.as_ref()) {
+    let motion = |part: &Drawn, stop: &Option<Stop>| match part
+        .words
+        .as_ref()
+        .and_then(|w| w.motion.as_ref())
+    {
         None => Motion::Still,
         Some(PartMotion::Table(_)) => part.table().map_or(Motion::Still, Motion::Table),
         Some(PartMotion::Pressed(words)) => Motion::Pressed(PressedPart {
             // What is given holds the whole.
             force: force(words, copies),
             spring: words.spring.map_or(0.0, |s| s.si()) / copies,
-            travel: words.travel.si(),
+            travel: stop.as_ref().map_or(0.0, |s| s.travel),
             mass: words.mass.map_or(usual, |m| m.si() / copies),
         }),
     };
-    let of = |part: &Drawn| {
+    let of = |(part, stop): (&Drawn, &Option<Stop>)| {
         let all = model.rigid_contacts().iter().enumerate();
         let contacts = all.filter(|(_, c)| part.name.is_of(&c.name));
         let contacts = contacts.map(|(k, _)| k).collect();
-        MovedPart::new(part.name.clone(), part.outwards(), contacts, motion(part))
+        MovedPart::new(
+            part.name.clone(),
+            part.outwards(),
+            contacts,
+            motion(part, stop),
+        )
     };
-    parts.iter().map(of).collect()
+    parts.iter().zip(stops).map(of).collect()
 }
 
 fn force(words: &Pressed, copies: f64) -> ForceInTime {

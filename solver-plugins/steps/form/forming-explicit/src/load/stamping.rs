@@ -101,6 +101,14 @@ impl MovedPart {
         }
     }
 
+    /// How far it may go beyond the place where it is drawn (m), of one that is pressed.
+    pub fn travel(&self) -> Option<f64> {
+        match &self.motion {
+            Motion::Pressed(pressed) => Some(pressed.travel),
+            Motion::Still | Motion::Table(_) => None,
+        }
+    }
+
     /// Puts it where it is at time `t` (s).
     fn apply(&mut self, on: &mut dyn Loaded, t: f64, forming: f64) {
         let (dt, before) = (on.step_size(), self.way);
@@ -195,6 +203,8 @@ pub struct StampingLoad {
     pub parts: Vec<MovedPart>,
     /// Its grippers.
     pub grips: Vec<Grip>,
+    /// What is told of the stops of parts that the scene leaves out.
+    pub stops: Vec<String>,
 }
 
 impl StampingLoad {

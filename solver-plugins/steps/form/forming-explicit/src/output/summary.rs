@@ -102,6 +102,7 @@ fn attributes(
         scene: Some(p.scene.name.clone()),
         sheets: sheet_attributes(forming, p),
         contact_by_place: true,
+        without_bed: p.scene.process.is_without_bed(),
         symmetry: Some(symmetry::mirror_planes(m.planes())),
         element_size: forming.element_size,
         net_spacing: None,

@@ -123,6 +123,49 @@ fn a_pressed_part_gives_its_force_and_a_spring_what_it_is_pushed_back_by() {
 }
 
 #[test]
+fn a_pressed_part_without_travel_goes_on_to_the_part_that_it_meets_and_the_plies_bear_its_force() {
+    // A ply that only rests takes nanojoules, of which a bound in per cent says nothing.
+    let resting = |p: &mut Value| p["drift_bound"] = json!(1e6);
+    let force = json!({"pressed": {"force": "40 N"}});
+    let travel = |forming: &Forming, name: &str| {
+        let load = forming.load.stamping().unwrap();
+        let part = load.parts.iter().find(|p| p.name.word() == name).unwrap();
+        part.travel().unwrap()
+    };
+    // Drawn on the ply of 0.3 mm over the tool, and 5 mm over it.
+    for (face, open) in [(0.0103, 0.3e-3), (0.0153, 5.3e-3)] {
+        let p = stamped(
+            process(&[with(pad("pad", 0.0, face), force.clone())]),
+            resting,
+        );
+        let forming = build_global(&p, &BuiltIn).unwrap();
+        let found = travel(&forming, "pad");
+        // The field of a part is off it by less than a tenth of the ply.
+        assert!((found - open).abs() < 3e-5, "{found} for {open}");
+        let told = &forming.load.stamping().unwrap().stops;
+        assert!(
+            told.len() == 1 && told[0].contains("`pad`") && told[0].contains("it meets `tool`"),
+            "{told:?}"
+        );
+        assert!(forming.tool_warnings.is_empty());
+    }
+    let p = stamped(
+        process(&[with(pad("pad", 0.0, 0.0103), force.clone())]),
+        resting,
+    );
+    let (forming, outcome) = form(&p, 1);
+    let [[tool, _], [pad_force, way]] = outcome.history.last().unwrap().parts[..] else {
+        panic!("two parts");
+    };
+    assert!(
+        (pad_force - 40.0).abs() < 1.0 && (tool - 40.0).abs() < 1.0,
+        "{pad_force} {tool}"
+    );
+    // The ply holds it: it is far from its stop.
+    assert!(way < 0.0 && way > -0.1 * travel(&forming, "pad"), "{way}");
+}
+
+#[test]
 fn a_run_that_is_taken_up_has_its_parts_where_they_were() {
     let p = pushed();
     let mut forming = build_global(&p, &BuiltIn).unwrap();
