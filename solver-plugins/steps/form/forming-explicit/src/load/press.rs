@@ -3,7 +3,7 @@
 use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::backend::Loaded;
 use plyflow_mechanics::contact::RigidMotion;
-use plyflow_mechanics::history::{constant_speed_way, smooth_step};
+use plyflow_mechanics::history::{MonotoneCubic, constant_speed_way, smooth_step};
 use plyflow_mechanics::model::Model;
 
 /// Rate (1/s) at which the motion of a holder that a force presses dies out.
@@ -25,6 +25,13 @@ pub struct Stroke {
 }
 
 impl Stroke {
+    /// Makes all of it take `factor` times as long.
+    pub fn slow(&mut self, factor: f64) {
+        self.forming *= factor;
+        self.ramp *= factor;
+        self.settling *= factor;
+    }
+
     /// Way still to go (m) at time t (s).
     pub fn left(&self, t: f64) -> f64 {
         self.way - constant_speed_way(t, self.way, self.forming, self.ramp)
@@ -40,15 +47,37 @@ pub struct HeldByForce {
     pub mass: f64,
     /// Height at which it meets the die (m): nothing else stops it once the plies have left it.
     pub most: f64,
+    /// In a zone: its way in the run of the whole (m), beyond which it does not go.
+    pub recorded: Option<MonotoneCubic>,
     /// Its way towards the die (m).
     pub height: f64,
     /// (m/s).
     pub velocity: f64,
 }
 
+impl HeldByForce {
+    /// Its stop at time `t` (s), and how fast that goes (m/s) when it was at `before` (m) a step of `dt` (s) ago.
+    fn stop(&self, t: f64, before: f64, dt: f64) -> [f64; 2] {
+        match &self.recorded {
+            None => [self.most, 0.0],
+            Some(way) => {
+                let at = way.at(t);
+                [at, speed(at, before, dt)]
+            }
+        }
+    }
+}
+
+/// Mean speed (m/s) of what was at `before` (m) a step of `dt` (s) ago: none of what has not moved yet.
+fn speed(at: f64, before: f64, dt: f64) -> f64 {
+    if dt > 0.0 { (at - before) / dt } else { 0.0 }
+}
+
 /// What moves in a press.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressLoad {
+    /// When the run begins (s).
+    pub begin: f64,
     /// The punch.
     pub stroke: Stroke,
     /// Numbers of its contacts in [`Model::rigid_contacts`].
@@ -71,15 +100,7 @@ impl PressLoad {
             .map_or(height, |c| on.rigid_motion(*c).shift[2]);
         let moved = |height: f64, before: f64| RigidMotion {
             shift: [0.0, 0.0, height],
-            velocity: [
-                0.0,
-                0.0,
-                if dt > 0.0 {
-                    (height - before) / dt
-                } else {
-                    0.0
-                },
-            ],
+            velocity: [0.0, 0.0, speed(height, before, dt)],
         };
         for c in &self.punch {
             on.set_rigid_motion(*c, moved(height, before));
@@ -92,8 +113,9 @@ impl PressLoad {
         held.velocity += (force - resistance - drag) / held.mass * dt;
         let before = held.height;
         held.height += held.velocity * dt;
-        if held.height >= held.most {
-            (held.height, held.velocity) = (held.most, 0.0);
+        let [stop, rate] = held.stop(t, before, dt);
+        if held.height >= stop {
+            (held.height, held.velocity) = (stop, rate);
         }
         for c in &self.holder {
             on.set_rigid_motion(*c, moved(held.height, before));
@@ -117,7 +139,8 @@ impl PressLoad {
 
     /// Whether a holder that a force presses has met the die: the plies have left it.
     pub fn holder_is_bare(&self) -> bool {
-        self.held.as_ref().is_some_and(|h| h.height >= h.most)
+        let bare = |h: &HeldByForce| h.recorded.is_none() && h.height >= h.most;
+        self.held.as_ref().is_some_and(bare)
     }
 
     /// How far the holder has moved towards the die (m).

@@ -56,6 +56,21 @@ pub struct PressedPart {
     pub travel: f64,
     /// (kg); likewise.
     pub mass: f64,
+    /// In a zone: its way in the run of the whole (m), beyond which it does not go.
+    pub recorded: Option<MonotoneCubic>,
+}
+
+impl PressedPart {
+    /// Its stop at time `t` (s), and how fast that goes (m/s) when it was at `before` (m) a step of `dt` (s) ago.
+    fn stop(&self, t: f64, before: f64, dt: f64) -> [f64; 2] {
+        match &self.recorded {
+            None => [-self.travel, 0.0],
+            Some(way) => {
+                let at = way.at(t);
+                [at, if dt > 0.0 { (at - before) / dt } else { 0.0 }]
+            }
+        }
+    }
 }
 
 /// A rigid part and how it moves.
@@ -78,8 +93,14 @@ pub struct MovedPart {
 }
 
 impl MovedPart {
-    /// At the start.
-    pub fn new(name: RigidName, outwards: Vec3, contacts: Vec<usize>, motion: Motion) -> Self {
+    /// At the time `begin` (s).
+    pub fn new(
+        name: RigidName,
+        outwards: Vec3,
+        contacts: Vec<usize>,
+        motion: Motion,
+        begin: f64,
+    ) -> Self {
         let mut part = Self {
             name,
             outwards,
@@ -89,7 +110,7 @@ impl MovedPart {
             rate: 0.0,
             largest: 0.0,
         };
-        part.way = part.drawn_at(0.0);
+        part.way = part.drawn_at(begin);
         part
     }
 
@@ -97,7 +118,8 @@ impl MovedPart {
     pub fn drawn_at(&self, t: f64) -> f64 {
         match &self.motion {
             Motion::Table(table) => table.at(t),
-            Motion::Still | Motion::Pressed(_) => 0.0,
+            Motion::Pressed(pressed) => pressed.recorded.as_ref().map_or(0.0, |way| way.at(t)),
+            Motion::Still => 0.0,
         }
     }
 
@@ -116,8 +138,9 @@ impl MovedPart {
                 let drag = PRESSED_DAMPING * pressed.mass * self.rate;
                 self.rate += (back - force.max(0.0) - drag) / pressed.mass * dt;
                 self.way += self.rate * dt;
-                if self.way <= -pressed.travel {
-                    (self.way, self.rate) = (-pressed.travel, 0.0);
+                let [stop, rate] = pressed.stop(t, before, dt);
+                if self.way <= stop {
+                    (self.way, self.rate) = (stop, rate);
                 }
             }
         }
@@ -145,7 +168,7 @@ impl MovedPart {
 /// A gripper on some nodes of a ply.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grip {
-    /// Nodes, each with its share of the force and its place at the start (m).
+    /// Nodes, each with its share of the force and its place at the start (m); none where it holds no part of a zone.
     pub nodes: Vec<(u32, f64, Vec3)>,
     /// Unit vector of its pull.
     pub pull: Vec3,
@@ -187,6 +210,8 @@ impl Grip {
 /// What moves and pulls in a stamping.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StampingLoad {
+    /// When the run begins (s).
+    pub begin: f64,
     /// Duration of what moves (s).
     pub forming: f64,
     /// What follows (s).
