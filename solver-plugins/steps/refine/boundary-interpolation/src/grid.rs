@@ -1,5 +1,6 @@
 //! Fine structured meshes of a zone's sheets, in the undeformed plane.
 
+use crate::outlined;
 use plyflow_geometry::rectangle;
 use plyflow_mechanics::mesh::{even_axis, multiples_axis};
 use plyflow_model::artifact::Rectangle;
@@ -20,39 +21,42 @@ pub struct Grid {
     pub cells: Vec<u32>,
     /// Nodes on each side that is cut, in ascending order along it; `None` for free sides.
     pub cuts: [Option<Vec<u32>>; SIDES],
-    /// The box that it fills (m).
+    /// Whether the mesh follows an outline: it has `pieces`, where it is cut, and no `cuts`.
+    pub outlined: bool,
+    /// Sides of its cells on the cut, the material on their left.
+    pub pieces: Vec<[u32; 2]>,
+    /// The box around it, which a mesh of rectangles fills (m).
     pub bounds: Rectangle,
 }
 
 impl Grid {
     /// All nodes on cut sides, ascending, each once.
     pub fn driven_nodes(&self) -> Vec<u32> {
-        let mut nodes: Vec<u32> = self.cuts.iter().flatten().flatten().copied().collect();
+        let sides = self.cuts.iter().flatten().flatten();
+        let mut nodes: Vec<u32> = sides.chain(self.pieces.as_flattened()).copied().collect();
         nodes.sort_unstable();
         nodes.dedup();
         nodes
     }
 }
 
-/// The part of a ply inside a zone. The ply is an upright rectangle, or the zone lies wholly inside of it.
+/// The part of a ply inside a zone (contours in m). Where the zone crosses an outline that is no upright rectangle, or a hole, it is the cells there
+/// of the mesh that the whole ply would have.
 ///
 /// # Errors
-/// When the zone crosses an outline that is no upright rectangle, or a hole (contours in m).
+/// When elements of `size` (m) cannot follow the contours that the zone crosses.
 pub fn ply_part(
     zone: Rectangle,
     outline: &[[f64; 2]],
     holes: &[Vec<[f64; 2]>],
     size: f64,
-) -> Result<Option<Grid>, &'static str> {
+) -> Result<Option<Grid>, String> {
     let ply = rectangle::around(outline.iter().copied());
     let box_area = (ply[2] - ply[0]) * (ply[3] - ply[1]);
     // Only an upright rectangle fills its box.
     let rectangle = (signed_area(outline).abs() - box_area).abs() < SAME_PLACE * box_area;
-    if !rectangle && crosses(zone, outline) {
-        return Err("its outline, which is no upright rectangle");
-    }
-    if holes.iter().any(|h| crosses(zone, h)) {
-        return Err("a hole");
+    if (!rectangle && crosses(zone, outline)) || holes.iter().any(|h| crosses(zone, h)) {
+        return outlined::part(zone, outline, holes, size);
     }
     if rectangle && holes.is_empty() {
         return Ok(ply_grid(zone, ply, size));
@@ -175,6 +179,8 @@ fn structured(xs: &[f64], ys: &[f64], free: [bool; SIDES]) -> Grid {
         points: points.collect(),
         cells,
         cuts,
+        outlined: false,
+        pieces: Vec::new(),
         bounds: [xs[0], ys[0], xs[nx], ys[ny]],
     }
 }

@@ -33,10 +33,7 @@ pub(crate) fn write_ways(
 ) -> Result<(), StepError> {
     let of_body = |name: &str| [format!("history/parts/{name}/way"), name.to_owned()];
     let bodies = meshes.bodies.iter().map(|b| of_body(&b.name));
-    let of_holder = [
-        "history/holder_travel".to_owned(),
-        "holder".to_owned(),
-    ];
+    let of_holder = ["history/holder_travel".to_owned(), "holder".to_owned()];
     let there = |[path, _]: &[String; 2]| host.array_info(input, path).is_some();
     let mut written = false;
     for [path, name] in bodies.chain([of_holder]).filter(there) {

@@ -10,6 +10,7 @@ mod exchange;
 mod grid;
 mod histories;
 mod late;
+mod outlined;
 mod place;
 mod pull;
 
@@ -389,14 +390,14 @@ fn part(
         return Ok(film_grid(zone, bounds, p.film_margin, size));
     }
     let outline = sheet.outline.clone().unwrap_or_else(|| corners(bounds));
-    let grid = ply_part(zone, &outline, &sheet.holes, p.element_size).map_err(|what| {
+    let grid = ply_part(zone, &outline, &sheet.holes, p.element_size);
+    Ok(grid.map_err(|why| {
         format!(
-            "the zone at {zone:?} m crosses {what}, of ply '{}'; a local run is built where a zone lies wholly inside of such \
-             a ply. Draw a zone inside of it (`boxes` of zone-extraction), or run the whole ply with smaller elements",
+            "the zone at {zone:?} m crosses the edge of ply '{}', which its elements are to follow: {why}. Take a smaller `element_size`, or draw a zone inside of \
+             the ply (`boxes` of zone-extraction)",
             sheet.name
         )
-    })?;
-    Ok(grid)
+    })?)
 }
 
 fn bounds(points: &[Vec3]) -> Rectangle {

@@ -68,13 +68,7 @@ impl Place {
     }
 }
 
-fn grip(
-    k: usize,
-    words: &Gripper,
-    model: &Model,
-    dt: f64,
-    zone: Option<&Cut<'_>>,
-) -> Result<Grip> {
+fn grip(k: usize, words: &Gripper, model: &Model, dt: f64, zone: Option<&Cut<'_>>) -> Result<Grip> {
     let at = format!("process.stamping.grippers[{k}]");
     let place = Place::new(words);
     let found = model.sheets().iter().find(|s| s.name == words.ply);

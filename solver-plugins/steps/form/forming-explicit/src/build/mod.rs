@@ -3,8 +3,8 @@
 pub mod apart;
 pub mod bag;
 pub mod bag_contacts;
-pub mod drawn;
 pub mod dies;
+pub mod drawn;
 pub mod feedback;
 pub mod films;
 pub mod grips;

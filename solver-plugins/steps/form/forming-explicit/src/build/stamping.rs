@@ -4,11 +4,11 @@
 
 use crate::build::apart::{Apart, Reach, check_apart, check_reach};
 use crate::build::drawn::{Drawn, drawn};
+use crate::build::grips::grips;
 use crate::build::press::{add_contacts, of_all_nodes};
 use crate::error::{FormingError, Result};
 use crate::forming::Forming;
 use crate::load::{ForceInTime, Load, Motion, MovedPart, PressedPart, StampingLoad};
-use crate::build::grips::grips;
 use crate::request::{LocalInput, Parameters};
 use crate::stack::{
     Components, Elements, PartSurface, Parts, RigidBody, RigidName, RigidPart, RigidShape,
@@ -161,11 +161,7 @@ fn blank_height(stamping: &Stamping, parts: &[Drawn], reach: &Reach) -> Result<f
 ///
 /// # Errors
 /// When a zone's boundary does not tell the way of such a part.
-pub fn moved(
-    parts: &[Drawn],
-    model: &Model,
-    zone: Option<&LocalInput>,
-) -> Result<Vec<MovedPart>> {
+pub fn moved(parts: &[Drawn], model: &Model, zone: Option<&LocalInput>) -> Result<Vec<MovedPart>> {
     let (slower, begin) = zone.map_or((1.0, 0.0), |z| (z.slower, z.time[0]));
     let copies = model.planes().copies() as f64;
     let plies: f64 = model.mass().iter().sum();
