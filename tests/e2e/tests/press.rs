@@ -4,6 +4,19 @@ use plyflow_e2e::{Study, wait_for, well, workers_of};
 
 /// Two plies of a fabric at 45 degrees through a round hole, 12 mm deep, between die and holder.
 fn study(hold: &str) -> Study {
+    study_of(
+        hold,
+        "
+steps:
+  press:
+    plugin: forming-explicit
+    with: {scene: scene.yaml, element: m4, element_size: 5 mm, frames: 24, tool_grid: 2 mm, contact_augmentation: 0}
+",
+    )
+}
+
+/// The same scene with these steps.
+fn study_of(hold: &str, steps: &str) -> Study {
     let scene = format!(
         "
 plyflow_scene: 1
@@ -34,14 +47,7 @@ with:
   fibre_modulus: 3 GPa
   shear: {coefficients: [0 N/m, 100 N/m]}
 ";
-    let study = Study::new(
-        "
-steps:
-  press:
-    plugin: forming-explicit
-    with: {scene: scene.yaml, element: m4, element_size: 5 mm, frames: 24, tool_grid: 2 mm, contact_augmentation: 0}
-",
-    );
+    let study = Study::new(steps);
     std::fs::write(study.path("scene.yaml"), scene).expect("a scene");
     std::fs::write(study.path("fabric.yaml"), fabric).expect("a material");
     study
@@ -105,4 +111,34 @@ fn a_press_with_a_holder_at_a_gap_goes_on_to_the_same_bytes() {
 #[test]
 fn a_press_with_a_holder_under_a_force_goes_on_to_the_same_bytes() {
     killed_and_resumed("{force: 200 N}");
+}
+
+/// A coarse run, a zone at a corner of the plies, and its fine run between punch, die and a holder that a force presses.
+const WITH_ZONE: &str = "
+steps:
+  coarse:
+    plugin: forming-explicit
+    with: {scene: scene.yaml, element: m4, element_size: 10 mm, frames: 24, tool_grid: 2 mm, contact_augmentation: 0}
+  defects: {plugin: defect-detection, from: {formed: coarse}}
+  zones: {plugin: zone-extraction, from: {defects: defects}, with: {boxes: [[-60 mm, -60 mm, 10 mm, 20 mm]]}}
+  boundary: {plugin: boundary-interpolation, for_each: {zone: zones}, from: {formed: coarse, zones: zones}, with: {element_size: 5 mm}}
+  local:
+    plugin: forming-explicit
+    for_each: {zone: zones}
+    from: {boundary: boundary}
+    with: {scene: scene.yaml, element: m4, frames: 12, tool_grid: 2 mm, contact_augmentation: 0}
+  comparison: {plugin: comparison, from: {global: coarse, zones: zones, local: local}}
+";
+
+#[test]
+fn a_zone_of_a_press_is_run_through_the_real_plugins_to_the_same_bytes_on_two_threads() {
+    let one = study_of("{force: 200 N}", WITH_ZONE);
+    assert_eq!(one.run(&["--jobs", "1"]), well(6, 0));
+    assert!(one.values("local", "cycles")[0] > 0.0);
+    assert!(one.values("local", "drift_ratio")[0] < 0.02);
+    // Both plies have 14 x 16 elements in the zone, where the whole has 12 x 12 coarse ones.
+    assert_eq!(one.values("local", "elements"), [2.0 * 14.0 * 16.0]);
+    let two = study_of("{force: 200 N}", WITH_ZONE);
+    assert_eq!(two.run(&["--jobs", "2"]), well(6, 0));
+    assert!(one.artifacts() == two.artifacts());
 }
