@@ -11,11 +11,13 @@ mod grid;
 mod histories;
 mod late;
 mod outlined;
+mod part;
 mod place;
 mod pull;
 
 pub use cut::Placed;
-pub use grid::{Grid, film_grid, ply_grid, ply_part};
+pub use grid::{Grid, film_grid, ply_grid};
+pub use part::ply_part;
 
 use coarse::{Pulls, Whole};
 use exchange::{Exchange, Part};

@@ -183,7 +183,7 @@ mod tests {
         let cells = coarse.cells.as_flattened();
         let outline = [[0.0, 0.0], [0.1, 0.0], [0.06, 0.06], [0.0, 0.06]];
         let zone = [0.03, 0.02, 0.2, 0.05];
-        let grid = crate::grid::ply_part(zone, &outline, &[], 0.005)
+        let grid = crate::part::ply_part(zone, &outline, &[], 0.005)
             .unwrap()
             .unwrap();
         let driven = grid.driven_nodes();
