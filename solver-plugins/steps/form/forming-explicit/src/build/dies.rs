@@ -1,11 +1,12 @@
 //! What the sheets of a zone lie between in a press or a stamping: the rigid parts of the whole, which move as they do there.
 //!
-//! A part that follows a table or a stroke follows it. Of a part that is pressed a zone has a share of the force that nobody knows before: it has
-//! the whole force, and a stop that goes as the run of the whole recorded the part's way.
+//! A part that follows a table or a stroke follows it. One that is pressed has the share of its force that the zone has of the plies under it, about the
+//! way that the run of the whole recorded.
 
 use crate::build::drawn::drawn;
 use crate::build::grips::{Cut, grips};
 use crate::build::plates::Plates;
+use crate::build::under::Under;
 use crate::build::{press, stamping};
 use crate::error::Result;
 use crate::load::{Load, PressLoad, StampingLoad};
@@ -60,9 +61,14 @@ pub fn in_press(
     };
     load.stroke.slow(input.slower);
     if let Some(held) = &mut load.held {
-        let way = input.way_of(RigidName::Holder.word())?;
-        held.height = way.at(load.begin);
-        held.recorded = Some(way);
+        let under = Under {
+            input,
+            whole: &whole,
+        };
+        let inner = plates.holder.map_or(0.0, |h| h.opening + h.edge);
+        let guide = under.guide(RigidName::Holder.word(), &|p| press::reach(&[p]) >= inner)?;
+        held.height = guide.way.at(load.begin);
+        held.guide = Some(guide);
     }
     load.apply(model, load.begin);
     let (rigid, errors) = press::shown(&plates, press::reach(&corners(&whole)?));
@@ -104,11 +110,16 @@ pub fn in_stamping(
         input,
         stack: sheets.stack,
     };
+    let whole = sheet::stack(&p.scene)?;
+    let under = Under {
+        input,
+        whole: &whole,
+    };
     let mut load = StampingLoad {
         begin: input.time[0],
         forming: input.slower * stamping.forming_time.si(),
         settling: input.slower * stamping.settling_time.si(),
-        parts: stamping::moved(&all, model, Some(input))?,
+        parts: stamping::moved(&all, model, Some(&under))?,
         grips: grips(stamping, model, p.time_step, Some(&cut))?,
     };
     stamping::put(&load, model);

@@ -12,6 +12,7 @@ pub mod layout;
 pub mod plates;
 pub mod press;
 pub mod stamping;
+pub mod under;
 pub mod zone;
 
 pub use feedback::feed_back;

@@ -121,7 +121,7 @@ pub fn press_load(press: &Press, plates: &Plates, model: &Model) -> PressLoad {
             force: force.si() / model.planes().copies() as f64,
             mass: HOLDER_MASS * model.mass().iter().sum::<f64>(),
             most: plates.thickness(),
-            recorded: None,
+            guide: None,
             height: 0.0,
             velocity: 0.0,
         }),

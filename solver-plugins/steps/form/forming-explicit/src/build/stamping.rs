@@ -6,10 +6,11 @@ use crate::build::apart::{Apart, Reach, check_apart, check_reach};
 use crate::build::drawn::{Drawn, drawn};
 use crate::build::grips::grips;
 use crate::build::press::{add_contacts, of_all_nodes};
+use crate::build::under::Under;
 use crate::error::{FormingError, Result};
 use crate::forming::Forming;
 use crate::load::{ForceInTime, Load, Motion, MovedPart, PressedPart, StampingLoad};
-use crate::request::{LocalInput, Parameters};
+use crate::request::Parameters;
 use crate::stack::{
     Components, Elements, PartSurface, Parts, RigidBody, RigidName, RigidPart, RigidShape,
     StackSheet, sheet, symmetry, tool,
@@ -161,8 +162,8 @@ fn blank_height(stamping: &Stamping, parts: &[Drawn], reach: &Reach) -> Result<f
 ///
 /// # Errors
 /// When a zone's boundary does not tell the way of such a part.
-pub fn moved(parts: &[Drawn], model: &Model, zone: Option<&LocalInput>) -> Result<Vec<MovedPart>> {
-    let (slower, begin) = zone.map_or((1.0, 0.0), |z| (z.slower, z.time[0]));
+pub fn moved(parts: &[Drawn], model: &Model, zone: Option<&Under<'_>>) -> Result<Vec<MovedPart>> {
+    let (slower, begin) = zone.map_or((1.0, 0.0), |z| (z.input.slower, z.input.time[0]));
     let copies = model.planes().copies() as f64;
     let plies: f64 = model.mass().iter().sum();
     let pressed = parts.iter().filter(|p| p.is_pressed()).count().max(1);
@@ -173,14 +174,14 @@ pub fn moved(parts: &[Drawn], model: &Model, zone: Option<&LocalInput>) -> Resul
         let Some(PartMotion::Pressed(words)) = words else {
             return Ok(words.and_then(|_| table()).unwrap_or(Motion::Still));
         };
-        let recorded = zone.map(|z| z.way_of(part.name.word())).transpose()?;
+        let guide = zone.map(|z| z.guide_of(part)).transpose()?;
         Ok(Motion::Pressed(PressedPart {
             // What is given holds the whole.
             force: force(words, copies, slower),
             spring: words.spring.map_or(0.0, |s| s.si()) / copies,
             travel: words.travel.si(),
             mass: words.mass.map_or(usual, |m| m.si() / copies),
-            recorded,
+            guide,
         }))
     };
     let of = |part: &Drawn| {

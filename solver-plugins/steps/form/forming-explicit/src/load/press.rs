@@ -1,9 +1,10 @@
 //! What moves in a press: a rising punch, and a blank holder that a force presses towards the die.
 
+use crate::load::guide::Guide;
 use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::backend::Loaded;
 use plyflow_mechanics::contact::RigidMotion;
-use plyflow_mechanics::history::{MonotoneCubic, constant_speed_way, smooth_step};
+use plyflow_mechanics::history::{constant_speed_way, smooth_step};
 use plyflow_mechanics::model::Model;
 
 /// Rate (1/s) at which the motion of a holder that a force presses dies out.
@@ -47,8 +48,8 @@ pub struct HeldByForce {
     pub mass: f64,
     /// Height at which it meets the die (m): nothing else stops it once the plies have left it.
     pub most: f64,
-    /// In a zone: its way in the run of the whole (m), beyond which it does not go.
-    pub recorded: Option<MonotoneCubic>,
+    /// In a zone.
+    pub guide: Option<Guide>,
     /// Its way towards the die (m).
     pub height: f64,
     /// (m/s).
@@ -56,14 +57,11 @@ pub struct HeldByForce {
 }
 
 impl HeldByForce {
-    /// Its stop at time `t` (s), and how fast that goes (m/s) when it was at `before` (m) a step of `dt` (s) ago.
-    fn stop(&self, t: f64, before: f64, dt: f64) -> [f64; 2] {
-        match &self.recorded {
-            None => [self.most, 0.0],
-            Some(way) => {
-                let at = way.at(t);
-                [at, speed(at, before, dt)]
-            }
+    /// What presses it (N) at time `t` (s), of its whole force there.
+    fn pressing(&self, whole: f64, t: f64) -> f64 {
+        match &self.guide {
+            None => whole,
+            Some(guide) => guide.force(whole, guide.way.at(t) - self.height),
         }
     }
 }
@@ -108,14 +106,14 @@ impl PressLoad {
         let Some(held) = &mut self.held else { return };
         // The sheets' resistance of the last step: a holder many times their mass barely moves in one.
         let resistance: f64 = (self.holder.iter()).map(|c| on.rigid_force(*c)[2]).sum();
-        let force = held.force * smooth_step(t, 0.0, HOLD_RISE * self.stroke.forming);
+        let whole = held.force * smooth_step(t, 0.0, HOLD_RISE * self.stroke.forming);
+        let force = held.pressing(whole, t);
         let drag = HOLDER_DAMPING * held.mass * held.velocity;
         held.velocity += (force - resistance - drag) / held.mass * dt;
         let before = held.height;
         held.height += held.velocity * dt;
-        let [stop, rate] = held.stop(t, before, dt);
-        if held.height >= stop {
-            (held.height, held.velocity) = (stop, rate);
+        if held.height >= held.most {
+            (held.height, held.velocity) = (held.most, 0.0);
         }
         for c in &self.holder {
             on.set_rigid_motion(*c, moved(held.height, before));
@@ -139,8 +137,7 @@ impl PressLoad {
 
     /// Whether a holder that a force presses has met the die: the plies have left it.
     pub fn holder_is_bare(&self) -> bool {
-        let bare = |h: &HeldByForce| h.recorded.is_none() && h.height >= h.most;
-        self.held.as_ref().is_some_and(bare)
+        self.held.as_ref().is_some_and(|h| h.height >= h.most)
     }
 
     /// How far the holder has moved towards the die (m).

@@ -3,6 +3,7 @@
 //! The way of a part counts away from the sheets, from where the part is drawn. A part that is pressed is a mass on a straight line: its force
 //! and its spring press it towards the sheets up to its stop, and the plies push it back.
 
+use crate::load::guide::Guide;
 use crate::stack::RigidName;
 use plyflow_geometry::vec3::{Vec3, dot, scale, sub};
 use plyflow_mechanics::archive::{Archive, ArchiveError};
@@ -56,19 +57,17 @@ pub struct PressedPart {
     pub travel: f64,
     /// (kg); likewise.
     pub mass: f64,
-    /// In a zone: its way in the run of the whole (m), beyond which it does not go.
-    pub recorded: Option<MonotoneCubic>,
+    /// In a zone.
+    pub guide: Option<Guide>,
 }
 
 impl PressedPart {
-    /// Its stop at time `t` (s), and how fast that goes (m/s) when it was at `before` (m) a step of `dt` (s) ago.
-    fn stop(&self, t: f64, before: f64, dt: f64) -> [f64; 2] {
-        match &self.recorded {
-            None => [-self.travel, 0.0],
-            Some(way) => {
-                let at = way.at(t);
-                [at, if dt > 0.0 { (at - before) / dt } else { 0.0 }]
-            }
+    /// What presses it (N) at time `t` (s) and where it is `way` (m) off its place.
+    fn pressing(&self, t: f64, forming: f64, way: f64) -> f64 {
+        let whole = (self.force.at(t, forming) + self.spring * way).max(0.0);
+        match &self.guide {
+            None => whole,
+            Some(guide) => guide.force(whole, way - guide.way.at(t)),
         }
     }
 }
@@ -118,7 +117,7 @@ impl MovedPart {
     pub fn drawn_at(&self, t: f64) -> f64 {
         match &self.motion {
             Motion::Table(table) => table.at(t),
-            Motion::Pressed(pressed) => pressed.recorded.as_ref().map_or(0.0, |way| way.at(t)),
+            Motion::Pressed(pressed) => pressed.guide.as_ref().map_or(0.0, |g| g.way.at(t)),
             Motion::Still => 0.0,
         }
     }
@@ -134,13 +133,12 @@ impl MovedPart {
             Motion::Still => return,
             Motion::Table(table) => self.way = table.at(t),
             Motion::Pressed(pressed) => {
-                let force = pressed.force.at(t, forming) + pressed.spring * self.way;
+                let force = pressed.pressing(t, forming, self.way);
                 let drag = PRESSED_DAMPING * pressed.mass * self.rate;
-                self.rate += (back - force.max(0.0) - drag) / pressed.mass * dt;
+                self.rate += (back - force - drag) / pressed.mass * dt;
                 self.way += self.rate * dt;
-                let [stop, rate] = pressed.stop(t, before, dt);
-                if self.way <= stop {
-                    (self.way, self.rate) = (stop, rate);
+                if self.way <= -pressed.travel {
+                    (self.way, self.rate) = (-pressed.travel, 0.0);
                 }
             }
         }

@@ -248,11 +248,11 @@ fn a_zone_of_a_stamping_has_the_parts_and_grippers_of_the_whole_where_they_are_t
     println!("{largest} m, in the mean {mean} m");
     assert!(largest < 2e-4 && mean < 3e-5, "{largest} m, {mean} m");
     let [there, here] = [&whole.history, &outcome.history].map(|h| h.last().unwrap().parts.clone());
-    // The punch follows its table; holder and pad go as recorded, within a hundredth of what they went.
+    // The punch follows its table; holder and pad go as recorded, within some hundredths of what they went.
     for k in 1..4 {
         let off = (there[k][1] - here[k][1]).abs();
         assert!(
-            off <= 0.01 * there[k][1].abs(),
+            off <= 0.03 * there[k][1].abs(),
             "part {k}: {} m, {} m",
             there[k][1],
             here[k][1]
@@ -262,7 +262,8 @@ fn a_zone_of_a_stamping_has_the_parts_and_grippers_of_the_whole_where_they_are_t
     let share = |k: usize| here[k][0] / there[k][0];
     println!("shares of the forces: {:?}", [1, 2, 3].map(share));
     assert!((share(1) - 1.0).abs() < 0.1 && (share(2) - 1.0).abs() < 0.1);
-    assert!(share(3) > 0.3 && share(3) < 1.0, "{}", share(3));
+    // Three of five rows of nodes under it are free; that at x = -8 mm is driven.
+    assert!((share(3) - 0.6).abs() < 0.03, "{}", share(3));
     // The gripper in the zone pulls as in the whole, the other one is in the motion of the cut.
     assert!(
         (here[4][0] / there[4][0] - 1.0).abs() < 0.01,
