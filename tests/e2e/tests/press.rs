@@ -137,14 +137,18 @@ steps:
 ";
 
 #[test]
-fn a_zone_across_a_hole_in_a_press_is_run_through_the_real_plugins_to_the_same_bytes_on_two_threads() {
+fn a_zone_across_a_hole_in_a_press_is_run_through_the_real_plugins_to_the_same_bytes_on_two_threads()
+ {
     let one = study_of("{force: 200 N}", HOLED, WITH_ZONE);
     assert_eq!(one.run(&["--jobs", "1"]), well(6, 0));
     assert!(one.values("local", "cycles")[0] > 0.0);
     assert!(one.values("local", "drift_ratio")[0] < 0.02);
     // The upper ply has 14 x 16 elements in the zone; the lower one, with its hole, fewer or a row more.
     let elements = one.values("local", "elements")[0];
-    assert!(elements > 1.8 * 14.0 * 16.0 && elements < 2.2 * 14.0 * 16.0, "{elements}");
+    assert!(
+        elements > 1.8 * 14.0 * 16.0 && elements < 2.2 * 14.0 * 16.0,
+        "{elements}"
+    );
     let two = study_of("{force: 200 N}", HOLED, WITH_ZONE);
     assert_eq!(two.run(&["--jobs", "2"]), well(6, 0));
     assert!(one.artifacts() == two.artifacts());
