@@ -3,6 +3,9 @@
 use super::shapes::Sheet;
 use plyflow_artifact::{ArtifactWriter, DType, FieldInfo, On};
 
+/// Name, unit and values over time of a column of a part.
+type OfPart<'a> = (&'a str, &'a str, &'a dyn Fn(f64) -> f64);
+
 /// Fields that no map shows: a scalar on cells, one on points, a vector, and one that is the same everywhere.
 pub fn further_fields(w: &mut ArtifactWriter, name: &str, s: &Sheet, last: bool) {
     let n = s.flat.len() / 3;
@@ -25,7 +28,7 @@ pub fn further_fields(w: &mut ArtifactWriter, name: &str, s: &Sheet, last: bool)
 pub fn history(w: &mut ArtifactWriter, press: bool, parts: &[(&str, f64)]) {
     for (name, force) in parts {
         let time = (0..600).map(|i| f64::from(i) / 599.0);
-        let columns: [(&str, &str, &dyn Fn(f64) -> f64); 2] = [
+        let columns: [OfPart<'_>; 2] = [
             ("way", "m", &|t| 0.03 * (1.0 - t)),
             ("force", "N", &|t| force * t * t),
         ];

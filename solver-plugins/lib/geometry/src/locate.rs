@@ -83,12 +83,20 @@ impl QuadLocator {
         best.map(|(_, location)| location)
     }
 
-    /// Inverse of the bilinear map by Newton's method, and how far outside of the cell the point lies (m).
-    fn within(&self, cell: usize, p: [f64; 2]) -> (f64, Location) {
+    /// As [`QuadLocator::locate`], but the weights go on beyond the sides of the nearest cell, so that they are those of (x, y) itself: for places
+    /// between an edge that is curved and the chords of a mesh along it.
+    pub fn locate_beyond(&self, x: f64, y: f64, tolerance: f64) -> Option<Location> {
+        let near = self.locate(x, y, tolerance)?;
+        let weights = weights(self.inverse(near.cell, [x, y]));
+        Some(Location { weights, ..near })
+    }
+
+    /// Where the bilinear map of a cell has a point, by Newton's method.
+    fn inverse(&self, cell: usize, p: [f64; 2]) -> [f64; 2] {
         let q = &self.corners[cell];
         let (mut s, mut t) = (0.5, 0.5);
         for _ in 0..25 {
-            let w = weights(s, t);
+            let w = weights([s, t]);
             let mut r = p;
             let (mut ds, mut dt) = ([0.0; 2], [0.0; 2]);
             for d in 0..2 {
@@ -111,7 +119,13 @@ impl QuadLocator {
                 break;
             }
         }
-        let w = weights(s.clamp(0.0, 1.0), t.clamp(0.0, 1.0));
+        [s, t]
+    }
+
+    /// The place of a cell that is nearest to a point, and how far outside of the cell that lies (m).
+    fn within(&self, cell: usize, p: [f64; 2]) -> (f64, Location) {
+        let q = &self.corners[cell];
+        let w = weights(self.inverse(cell, p).map(|s| s.clamp(0.0, 1.0)));
         let inside = [0, 1].map(|d| (0..4).map(|i| w[i] * q[i][d]).sum::<f64>());
         let miss = (p[0] - inside[0]).fixed_hypot(p[1] - inside[1]);
         (
@@ -125,6 +139,6 @@ impl QuadLocator {
     }
 }
 
-fn weights(s: f64, t: f64) -> [f64; 4] {
+fn weights([s, t]: [f64; 2]) -> [f64; 4] {
     [(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t]
 }

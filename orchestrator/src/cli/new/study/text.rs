@@ -333,7 +333,7 @@ impl Study {
         text += &comment(
             2,
             &format!(
-                "In minutes: the whole part in shells, as zones do not work in a press. element_size: half of {}, {}. No mass is added, so the time step \
+                "In minutes: the whole part in shells. element_size: half of {}, {}. No mass is added, so the time step \
                  follows the elements; hourglass_floor: 0 N/m would be right for a woven fabric.",
                 whole.value, whole.why
             ),

@@ -147,7 +147,7 @@ impl Model {
         for contact in &self.contacts.rigid {
             for item in &contact.items {
                 let x = &mut self.state.x[item.node as usize];
-                let (distance, out) = contact.surface.distance(*x);
+                let (distance, out) = contact.surface.distance(sub(*x, contact.motion.shift));
                 let gap = distance - contact.offset;
                 if gap < 0.0 {
                     *x = sub(*x, scale(out, gap));

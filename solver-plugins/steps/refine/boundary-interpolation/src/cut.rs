@@ -7,6 +7,8 @@ use plyflow_surface::{SmoothSheet, StandOff, Topology};
 
 /// How far outside of the coarse mesh a node may lie (m): rounding of outlines.
 const SLACK: f64 = 1e-5;
+/// The same of a mesh that follows an outline, over the length of a coarse element: chords of the coarse mesh cut curved edges off.
+const CHORDS: f64 = 0.3;
 
 /// A fine sheet placed in its coarse one.
 #[derive(Debug, Clone)]
@@ -47,8 +49,13 @@ impl Placed {
     /// With the place of the first node that lies off the coarse mesh.
     pub fn new(grid: Grid, points: &[Vec3], cells: &[u32]) -> Result<Self, String> {
         let locator = QuadLocator::new(points, cells).ok_or("the coarse sheet has no cell")?;
+        let outlined = grid.outlined;
+        let topology = Topology::new(points.len(), 4, cells);
+        let beyond = CHORDS * mean_size(points, &topology);
         let find = |[x, y]: [f64; 2]| {
-            locator.locate(x, y, SLACK).ok_or_else(|| {
+            let inside = locator.locate(x, y, SLACK);
+            let on_chords = || locator.locate_beyond(x, y, beyond).filter(|_| outlined);
+            inside.or_else(on_chords).ok_or_else(|| {
                 format!("the fine node at ({x}, {y}) m lies off the coarse mesh; is the zone inside the sheet?")
             })
         };
@@ -57,12 +64,11 @@ impl Placed {
         let height = |(l, &[x, y]): (&Location, &[f64; 2])| [x, y, l.interpolate(points)[2]];
         let placed = locations.iter().zip(&grid.points).map(height).collect();
         let driven_nodes = grid.driven_nodes();
-        let crossings = crossings(&grid, &driven_nodes, points, cells);
-        let topology = Topology::new(points.len(), 4, cells);
+        let mut crossings = crossings(&grid, &driven_nodes, points, &topology);
+        crossings.extend(piece_crossings(&grid, &driven_nodes, points, &topology));
         let undeformed = SmoothSheet::new(points.to_vec(), cells);
         let lift = |l: &Location| undeformed.lift(&l.nodes, &l.weights);
-        let [x0, y0, x1, y1] = grid.bounds;
-        let fine_area = (x1 - x0) * (y1 - y0) / (grid.cells.len() / 4) as f64;
+        let fine_area = cell_area(&grid);
         Ok(Self {
             stand_off: StandOff::new(points, &topology, fine_area),
             cells: cells.to_vec(),
@@ -130,8 +136,70 @@ impl Placed {
     }
 }
 
-fn crossings(grid: &Grid, driven: &[u32], points: &[Vec3], cells: &[u32]) -> Vec<Crossing> {
-    let topology = Topology::new(points.len(), 4, cells);
+/// Mean area of a fine cell (m2).
+fn cell_area(grid: &Grid) -> f64 {
+    let cells = grid.cells.as_chunks::<4>().0;
+    if !grid.outlined {
+        let [x0, y0, x1, y1] = grid.bounds;
+        return (x1 - x0) * (y1 - y0) / cells.len() as f64;
+    }
+    let area = |cell: &[u32; 4]| {
+        let [a, b, c, d] = cell.map(|n| grid.points[n as usize]);
+        0.5 * ((c[0] - a[0]) * (d[1] - b[1]) - (c[1] - a[1]) * (d[0] - b[0]))
+    };
+    cells.iter().map(area).sum::<f64>() / cells.len() as f64
+}
+
+/// Side (m) of a square as large as the mean cell of a flat mesh.
+fn mean_size(points: &[Vec3], topology: &Topology) -> f64 {
+    let areas = topology.cell_areas(points);
+    (areas.iter().sum::<f64>() / areas.len().max(1) as f64).sqrt()
+}
+
+/// Where lines of the coarse mesh cross the cut of a mesh that follows an outline.
+fn piece_crossings(
+    grid: &Grid,
+    driven: &[u32],
+    points: &[Vec3],
+    topology: &Topology,
+) -> Vec<Crossing> {
+    let mut found = Vec::new();
+    for ends in &grid.pieces {
+        let [p, q] = ends.map(|n| grid.points[n as usize]);
+        let along = [q[0] - p[0], q[1] - p[1]];
+        // Signed distance from the line through the piece, times its length.
+        let off = |n: usize| along[0] * (points[n][1] - p[1]) - along[1] * (points[n][0] - p[0]);
+        let fine = ends.map(|i| driven.partition_point(|&d| d < i));
+        for a in 0..topology.nodes() {
+            let da = off(a);
+            for &b in topology
+                .edge_neighbours(a)
+                .iter()
+                .filter(|b| **b as usize > a)
+            {
+                let db = off(b as usize);
+                if da * db >= 0.0 {
+                    continue;
+                }
+                let w = da / (da - db);
+                let at = [0, 1].map(|d| points[a][d] + w * (points[b as usize][d] - points[a][d]));
+                let way = (at[0] - p[0]) * along[0] + (at[1] - p[1]) * along[1];
+                let share = way / (along[0] * along[0] + along[1] * along[1]);
+                if (0.0..=1.0).contains(&share) {
+                    found.push(Crossing {
+                        coarse: [a as u32, b],
+                        coarse_weight: w,
+                        fine,
+                        fine_weight: share,
+                    });
+                }
+            }
+        }
+    }
+    found
+}
+
+fn crossings(grid: &Grid, driven: &[u32], points: &[Vec3], topology: &Topology) -> Vec<Crossing> {
     let mut found = Vec::new();
     for side in 0..SIDES {
         let Some(nodes) = &grid.cuts[side] else {

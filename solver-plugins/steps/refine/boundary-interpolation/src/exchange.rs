@@ -162,6 +162,12 @@ fn neighbours(grid: &Grid, driven: &[u32]) -> Vec<[usize; 2]> {
             beside[place(i)].get_or_insert(both);
         }
     }
+    // Of a cut that follows cells of an outlined ply.
+    let place = |n: u32| driven.partition_point(|d| *d < n);
+    for [from, to] in grid.pieces.iter().map(|p| p.map(place)) {
+        beside[from].get_or_insert([from; 2])[1] = to;
+        beside[to].get_or_insert([to; 2])[0] = from;
+    }
     beside
         .into_iter()
         .map(|b| b.expect("a driven node lies on a cut side"))

@@ -3,7 +3,6 @@
 use plyflow_geometry::rectangle;
 use plyflow_mechanics::mesh::{even_axis, multiples_axis};
 use plyflow_model::artifact::Rectangle;
-use plyflow_model::outline::{sides, signed_area, winds};
 
 /// Sides in the order left, right, bottom, top.
 pub const SIDES: usize = 4;
@@ -20,81 +19,23 @@ pub struct Grid {
     pub cells: Vec<u32>,
     /// Nodes on each side that is cut, in ascending order along it; `None` for free sides.
     pub cuts: [Option<Vec<u32>>; SIDES],
-    /// The box that it fills (m).
+    /// Whether the mesh follows an outline: it has `pieces`, where it is cut, and no `cuts`.
+    pub outlined: bool,
+    /// Sides of its cells on the cut, the material on their left.
+    pub pieces: Vec<[u32; 2]>,
+    /// The box around it, which a mesh of rectangles fills (m).
     pub bounds: Rectangle,
 }
 
 impl Grid {
     /// All nodes on cut sides, ascending, each once.
     pub fn driven_nodes(&self) -> Vec<u32> {
-        let mut nodes: Vec<u32> = self.cuts.iter().flatten().flatten().copied().collect();
+        let sides = self.cuts.iter().flatten().flatten();
+        let mut nodes: Vec<u32> = sides.chain(self.pieces.as_flattened()).copied().collect();
         nodes.sort_unstable();
         nodes.dedup();
         nodes
     }
-}
-
-/// The part of a ply inside a zone. The ply is an upright rectangle, or the zone lies wholly inside of it.
-///
-/// # Errors
-/// When the zone crosses an outline that is no upright rectangle, or a hole (contours in m).
-pub fn ply_part(
-    zone: Rectangle,
-    outline: &[[f64; 2]],
-    holes: &[Vec<[f64; 2]>],
-    size: f64,
-) -> Result<Option<Grid>, &'static str> {
-    let ply = rectangle::around(outline.iter().copied());
-    let box_area = (ply[2] - ply[0]) * (ply[3] - ply[1]);
-    // Only an upright rectangle fills its box.
-    let rectangle = (signed_area(outline).abs() - box_area).abs() < SAME_PLACE * box_area;
-    if !rectangle && crosses(zone, outline) {
-        return Err("its outline, which is no upright rectangle");
-    }
-    if holes.iter().any(|h| crosses(zone, h)) {
-        return Err("a hole");
-    }
-    if rectangle && holes.is_empty() {
-        return Ok(ply_grid(zone, ply, size));
-    }
-    let middle = [0.5 * (zone[0] + zone[2]), 0.5 * (zone[1] + zone[3])];
-    let material = (rectangle || winds(outline, middle)) && !holes.iter().any(|h| winds(h, middle));
-    if !material {
-        return Ok(None);
-    }
-    let part = rectangle::intersection(zone, ply);
-    if is_less_than_a_cell(part, size) {
-        return Ok(None);
-    }
-    // The mesh of the whole has no straight lines here that a zone could be cut along.
-    let axes = [0, 1].map(|d| {
-        let length = part[d + 2] - part[d];
-        let cells = (length / size - SAME_PLACE).ceil();
-        even_axis(part[d], part[d + 2], length / cells)
-    });
-    Ok(Some(cut_ply(axes, ply)))
-}
-
-/// Whether a contour has a part inside a box; one that only touches it has none.
-fn crosses(zone: Rectangle, contour: &[[f64; 2]]) -> bool {
-    sides(contour).any(|(a, b)| {
-        // The part of the side between the zone's lines (Liang and Barsky 1984).
-        let (mut from, mut to) = (0.0f64, 1.0f64);
-        for d in 0..2 {
-            let (low, high) = (zone[d] + SAME_PLACE, zone[d + 2] - SAME_PLACE);
-            let way = b[d] - a[d];
-            if way == 0.0 {
-                if a[d] < low || a[d] > high {
-                    return false;
-                }
-                continue;
-            }
-            let (s, t) = ((low - a[d]) / way, (high - a[d]) / way);
-            from = from.max(s.min(t));
-            to = to.min(s.max(t));
-        }
-        from <= to
-    })
 }
 
 /// The part of a rectangular ply in a zone, cut along lines of the mesh that the whole ply would have in elements of `size` (m):
@@ -114,12 +55,12 @@ pub fn ply_grid(zone: Rectangle, ply: Rectangle, size: f64) -> Option<Grid> {
     Some(cut_ply(axes, ply))
 }
 
-fn is_less_than_a_cell(part: Rectangle, size: f64) -> bool {
+pub(crate) fn is_less_than_a_cell(part: Rectangle, size: f64) -> bool {
     (0..2).any(|d| part[d + 2] - part[d] < size - SAME_PLACE)
 }
 
 /// A mesh between lines, free where these are a ply's edges.
-fn cut_ply([xs, ys]: [Vec<f64>; 2], ply: Rectangle) -> Grid {
+pub(crate) fn cut_ply([xs, ys]: [Vec<f64>; 2], ply: Rectangle) -> Grid {
     let same = |line: f64, edge: f64| (line - edge).abs() < SAME_PLACE;
     let free = [
         same(xs[0], ply[0]),
@@ -175,6 +116,8 @@ fn structured(xs: &[f64], ys: &[f64], free: [bool; SIDES]) -> Grid {
         points: points.collect(),
         cells,
         cuts,
+        outlined: false,
+        pieces: Vec::new(),
         bounds: [xs[0], ys[0], xs[nx], ys[ny]],
     }
 }

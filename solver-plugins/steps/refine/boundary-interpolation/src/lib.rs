@@ -8,12 +8,16 @@ mod coarse;
 mod cut;
 mod exchange;
 mod grid;
+mod histories;
 mod late;
+mod outlined;
+mod part;
 mod place;
 mod pull;
 
 pub use cut::Placed;
-pub use grid::{Grid, film_grid, ply_grid, ply_part};
+pub use grid::{Grid, film_grid, ply_grid};
+pub use part::ply_part;
 
 use coarse::{Pulls, Whole};
 use exchange::{Exchange, Part};
@@ -21,7 +25,7 @@ use place::Place;
 
 use plyflow_geometry::rectangle;
 use plyflow_geometry::vec3::Vec3;
-use plyflow_mechanics::history::{linear, spline_slopes};
+use plyflow_mechanics::history::spline_slopes;
 use plyflow_model::artifact::{
     Boundary, Forming, MeshStudy, PlainBody, Rectangle, Sheet, Zone, Zones,
 };
@@ -104,7 +108,8 @@ impl Step for BoundaryInterpolation {
         write(host, &own, first, &sheets)?;
         let loads = exchange.as_ref().filter(|e| e.has(Part::Loads));
         let loads = loads.map_or(&input, |e| &e.input);
-        write_histories(host, loads, &meshes.times[first..])?;
+        histories::write(host, loads, &meshes.times[first..])?;
+        histories::write_ways(host, loads, &meshes, meshes.times[first], p.slower)?;
         let times = &own[first..];
         let error = sheets.iter().map(|s| s.error).fold(0.0, f64::max);
         host.write_attributes(&Boundary {
@@ -387,14 +392,14 @@ fn part(
         return Ok(film_grid(zone, bounds, p.film_margin, size));
     }
     let outline = sheet.outline.clone().unwrap_or_else(|| corners(bounds));
-    let grid = ply_part(zone, &outline, &sheet.holes, p.element_size).map_err(|what| {
+    let grid = ply_part(zone, &outline, &sheet.holes, p.element_size);
+    Ok(grid.map_err(|why| {
         format!(
-            "the zone at {zone:?} m crosses {what}, of ply '{}'; a local run is built where a zone lies wholly inside of such \
-             a ply. Draw a zone inside of it (`boxes` of zone-extraction), or run the whole ply with smaller elements",
+            "the zone at {zone:?} m crosses the edge of ply '{}', which its elements are to follow: {why}. Take a smaller `element_size`, or draw a zone inside of \
+             the ply (`boxes` of zone-extraction)",
             sheet.name
         )
-    })?;
-    Ok(grid)
+    })?)
 }
 
 fn bounds(points: &[Vec3]) -> Rectangle {
@@ -464,32 +469,6 @@ fn write_sheet(host: &Host, times: &[f64], first: usize, s: &Driven) -> Result<(
         let shape = [start.states, n, 3];
         host.write_f64(&at("path"), &shape, "m", &start.path)?;
         host.write_f64(&at("start_velocity"), &[n, 3], "m/s", &start.velocity)?;
-    }
-    Ok(())
-}
-
-/// Process histories at the frames; those that the coarse run does not have are left out.
-fn write_histories(host: &Host, input: &Input, times: &[f64]) -> Result<(), StepError> {
-    let histories = [
-        ("cavity_pressure", "Pa"),
-        ("bag_pressure", "Pa"),
-        ("frame_height", "m"),
-    ];
-    for (name, unit) in histories {
-        let path = format!("history/{name}");
-        if host.array_info(input, &path).is_none() {
-            continue;
-        }
-        let (t, _) = host.array_f64(input, "history/time")?;
-        let (values, _) = host.array_f64(input, &path)?;
-        if t.is_empty() || t.len() != values.len() {
-            let (a, b) = (t.len(), values.len());
-            return Err(
-                format!("'{}': history/time has {a} values, {path} {b}", input.step).into(),
-            );
-        }
-        let at_frames: Vec<f64> = times.iter().map(|&at| linear(&t, &values, at)).collect();
-        host.write_f64(name, &[times.len()], unit, &at_frames)?;
     }
     Ok(())
 }

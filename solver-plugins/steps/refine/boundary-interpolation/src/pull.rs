@@ -1,6 +1,7 @@
 //! What the surroundings of a zone pull at its cut with, in the coarse run.
 
 use crate::grid::{Grid, SAME_PLACE, SIDES};
+use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::{Vec3, add};
 use plyflow_geometry::{Location, QuadLocator};
 use plyflow_surface::traction;
@@ -68,6 +69,23 @@ impl Pull {
                     beside: [-1.0, 1.0].into_iter().filter_map(place).collect(),
                 });
             }
+        }
+        for ends in &grid.pieces {
+            let [a, b] = ends.map(|n| grid.points[n as usize]);
+            let way = [b[0] - a[0], b[1] - a[1]];
+            let length = way[0].fixed_hypot(way[1]);
+            // The material is on the left.
+            let normal = [way[1] / length, -way[0] / length];
+            let place = |side: f64| {
+                let at = |d: usize| 0.5 * (a[d] + b[d]) + side * BESIDE * length * normal[d];
+                locator.as_ref()?.locate(at(0), at(1), SAME_PLACE)
+            };
+            pieces.push(Piece {
+                ends: ends.map(|n| driven.partition_point(|d| *d < n)),
+                normal,
+                length,
+                beside: [-1.0, 1.0].into_iter().filter_map(place).collect(),
+            });
         }
         Self {
             pieces,
@@ -155,5 +173,33 @@ mod tests {
         // All of the cut: left, and bottom and top from there to the edge.
         let length: f64 = pull.lengths().iter().sum();
         assert!((length - (0.04 + 2.0 * 0.08)).abs() < 1e-12, "{length}");
+    }
+
+    #[test]
+    fn the_pulls_at_a_cut_across_an_edge_are_those_of_the_line_between_its_ends() {
+        // 100 x 60 mm in cells of 10 mm under 500 N/m along x; the fine ply ends at a slanted edge in them.
+        let axis = |n: u32| (0..=n).map(|i| 0.01 * f64::from(i)).collect::<Vec<_>>();
+        let coarse = plyflow_mechanics::mesh::QuadMesh::grid(&axis(10), &axis(6));
+        let cells = coarse.cells.as_flattened();
+        let outline = [[0.0, 0.0], [0.1, 0.0], [0.06, 0.06], [0.0, 0.06]];
+        let zone = [0.03, 0.02, 0.2, 0.05];
+        let grid = crate::part::ply_part(zone, &outline, &[], 0.005)
+            .unwrap()
+            .unwrap();
+        let driven = grid.driven_nodes();
+        let pull = Pull::new(&grid, &driven, &coarse.points, cells, 0.0);
+        let forces = [500.0, 0.0, 0.0].map(|v| vec![v; coarse.cells.len()]);
+        let all = pull.forces(&coarse.points, &forces);
+        let sum = all.iter().fold([0.0; 3], |s, f| add(s, *f));
+        // The material lies left of its pieces, which go around it: their normals along x add up to the way along y.
+        let y = |n: u32| grid.points[n as usize][1];
+        let way: f64 = grid.pieces.iter().map(|[a, b]| y(*b) - y(*a)).sum();
+        assert!(way < -0.025, "{way}");
+        assert!(
+            (sum[0] - 500.0 * way).abs() < 1e-9 && sum[1].abs() < 1e-9,
+            "{sum:?}"
+        );
+        let length: f64 = pull.lengths().iter().sum();
+        assert!(length > 0.09, "{length}");
     }
 }

@@ -1,8 +1,11 @@
 //! The splines and meshes that the step is made of.
 
-use plyflow_boundary_interpolation::{film_grid, ply_grid, ply_part};
+use plyflow_blank::Blank;
+use plyflow_boundary_interpolation::{Grid, Placed, film_grid, ply_grid, ply_part};
 use plyflow_mechanics::history::{linear, spline_slopes};
 use plyflow_mechanics::mesh::{QuadMesh, even_axis, graded_axis};
+use plyflow_model::outline::Region;
+use plyflow_surface::SmoothSheet;
 
 #[test]
 fn spline_gives_back_any_cubic_that_starts_at_rest() {
@@ -171,7 +174,7 @@ fn a_smaller_ply_has_its_own_edges() {
 }
 
 #[test]
-fn a_zone_is_cut_out_of_a_polygon_only_where_it_lies_wholly_inside_or_outside() {
+fn a_zone_wholly_inside_of_a_polygon_is_a_box_and_one_beside_it_is_nothing() {
     let part =
         |zone, outline: &[[f64; 2]], holes: &[Vec<[f64; 2]>]| ply_part(zone, outline, holes, 0.005);
     let ell = [
@@ -196,24 +199,124 @@ fn a_zone_is_cut_out_of_a_polygon_only_where_it_lies_wholly_inside_or_outside() 
     ] {
         assert_eq!(part(zone, &ell, &hole), Ok(None), "{zone:?}");
     }
-    let slanted = [[0.0, 0.0], [0.2, 0.0], [0.0, 0.2]];
-    for (zone, outline, what) in [
-        ([0.06, 0.06, 0.1, 0.1], &ell[..], "outline"),
-        ([0.09, 0.01, 0.13, 0.05], &ell[..], "hole"),
-        ([0.08, 0.08, 0.15, 0.15], &slanted[..], "outline"),
-        ([-1.0, -1.0, 1.0, 1.0], &slanted[..], "outline"),
-    ] {
-        let refused = part(zone, outline, &hole).unwrap_err();
-        assert!(refused.contains(what), "{zone:?}: {refused}");
-    }
-    // A rectangle has edges of its own, but not a hole.
+    // A rectangle has edges of its own.
     let plate = rectangle([0.0, 0.0, 0.2, 0.1]);
-    assert!(
-        part([-0.1, -0.1, 0.05, 0.05], &plate, &hole)
-            .unwrap()
-            .is_some()
-    );
-    assert!(part([0.1, 0.0, 0.2, 0.1], &plate, &hole).is_err());
+    let corner = part([-0.1, -0.1, 0.05, 0.05], &plate, &hole);
+    assert!(!corner.unwrap().unwrap().outlined);
+}
+
+/// Area of a flat mesh (m2).
+fn area(grid: &Grid) -> f64 {
+    let of = |cell: &[u32; 4]| {
+        let [a, b, c, d] = cell.map(|n| grid.points[n as usize]);
+        0.5 * ((c[0] - a[0]) * (d[1] - b[1]) - (c[1] - a[1]) * (d[0] - b[0]))
+    };
+    grid.cells.as_chunks().0.iter().map(of).sum()
+}
+
+#[test]
+fn a_zone_across_an_edge_a_notch_or_a_hole_has_cells_of_the_whole_ply_and_is_driven_at_its_cut_alone()
+ {
+    let ell = [
+        [0.0, 0.0],
+        [0.2, 0.0],
+        [0.2, 0.08],
+        [0.08, 0.08],
+        [0.08, 0.2],
+        [0.0, 0.2],
+    ];
+    let around = |k: usize| {
+        let (s, c) = (k as f64 * 0.1 * std::f64::consts::PI).sin_cos();
+        [0.14 + 0.02 * c, 0.04 + 0.02 * s]
+    };
+    let holes = vec![(0..20).map(around).collect::<Vec<_>>()];
+    let size = 0.005;
+    let region = Region::new(ell.to_vec(), holes.clone()).unwrap();
+    let (whole, _) = Blank::Region(region.clone()).mesh(size).unwrap();
+    // Over the inner corner; over the rim and the hole; the whole.
+    for (zone, cut) in [
+        ([0.06, 0.06, 0.1, 0.1], true),
+        ([0.13, -0.01, 0.17, 0.05], true),
+        ([-1.0, -1.0, 1.0, 1.0], false),
+    ] {
+        let grid = ply_part(zone, &ell, &holes, size).unwrap().unwrap();
+        assert!(grid.outlined && grid.cuts.iter().all(Option::is_none));
+        assert_eq!(!grid.pieces.is_empty(), cut);
+        for p in &grid.points {
+            assert!(
+                whole.points.iter().any(|q| q[0] == p[0] && q[1] == p[1]),
+                "{p:?}"
+            );
+        }
+        // All of the ply in the zone, and less than an element more on every side.
+        let inside =
+            |p: &[f64; 2], by: f64| (0..2).all(|d| p[d] > zone[d] - by && p[d] < zone[d + 2] + by);
+        let cells = whole.cells.iter();
+        let all = cells.filter(|c| {
+            c.iter().all(|n| {
+                let [x, y, _] = whole.points[*n as usize];
+                inside(&[x, y], 1e-9)
+            })
+        });
+        assert!(grid.cells.len() / 4 >= all.count());
+        assert!(grid.points.iter().all(|p| inside(p, 2.0 * size)));
+        // What is driven lies beyond the zone's sides or on them, and not on the ply's own edge but where the cut ends there.
+        let driven = grid.driven_nodes();
+        for n in &driven {
+            assert!(
+                !inside(&grid.points[*n as usize], -1e-9),
+                "{:?}",
+                grid.points[*n as usize]
+            );
+        }
+        let on_edge = |n: &&u32| region.distance_to_edge(grid.points[**n as usize]) < 1e-7;
+        // The cut from edge to edge: two ends each, of one cut over the corner, and of three over rim and hole.
+        let ends = driven.iter().filter(on_edge).count();
+        let expected = match (cut, zone[1] > 0.0) {
+            (false, _) => 0,
+            (true, true) => 2,
+            (true, false) => 4,
+        };
+        assert_eq!(ends, expected, "{zone:?}");
+        if !cut {
+            assert!((area(&grid) / region.area() - 1.0).abs() < 1e-2);
+        }
+    }
+    let refused = ply_part([0.06, 0.06, 0.1, 0.1], &ell, &holes, 0.03).unwrap_err();
+    assert!(refused.contains("element size of at most"), "{refused}");
+}
+
+#[test]
+fn nodes_between_a_curved_edge_and_the_chords_of_the_coarse_mesh_go_on_with_its_motion() {
+    let circle: Vec<[f64; 2]> = (0..360)
+        .map(|k| {
+            let (s, c) = f64::from(k).to_radians().sin_cos();
+            [0.06 * c, 0.06 * s]
+        })
+        .collect();
+    let region = Region::new(circle.clone(), Vec::new()).unwrap();
+    let (coarse, _) = Blank::Region(region).mesh(0.012).unwrap();
+    let grid = ply_part([0.0, 0.0, 0.1, 0.1], &circle, &[], 0.004)
+        .unwrap()
+        .unwrap();
+    let cells = coarse.cells.as_flattened();
+    let placed = Placed::new(grid, &coarse.points, cells).unwrap();
+    // Stretched by 10 % along x, sheared and lifted: chords that are taken for the edge would hold nodes back by a tenth of what they cut off.
+    let moved = |p: &[f64; 3]| [1.1 * p[0] + 0.05 * p[1], p[1], 0.2 * p[0]];
+    let formed = coarse.points.iter().map(moved).collect();
+    let surface = SmoothSheet::new(formed, cells);
+    let everywhere = placed.everywhere(&surface);
+    let mut outside = 0;
+    for (now, then) in everywhere.iter().zip(&placed.points) {
+        let expected = moved(then);
+        let off = (0..3)
+            .map(|d| (now[d] - expected[d]).abs())
+            .fold(0.0, f64::max);
+        assert!(off < 1e-9, "{then:?}: {off} m");
+        let radius = then[0].hypot(then[1]);
+        outside += usize::from(radius > 0.0599);
+    }
+    assert!(outside > 15 && placed.driven_nodes.len() > 20, "{outside}");
 }
 
 #[test]

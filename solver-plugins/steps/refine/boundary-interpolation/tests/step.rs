@@ -487,3 +487,90 @@ fn sizes_a_thousandfold_too_small_are_refused_before_a_zone_is_meshed() {
         }
     }
 }
+
+#[test]
+fn rigid_parts_go_on_from_the_row_before_the_beginning_in_the_fine_run_s_own_time() {
+    let parameters = |with: Value| {
+        let mut all = json!({"element_size": 0.005});
+        all.as_object_mut()
+            .unwrap()
+            .extend(with.as_object().unwrap().clone());
+        all
+    };
+    let mut formed = coarse(0.0);
+    let none = interpolate(&formed, parameters(json!({})), &[1]).unwrap();
+    assert!(!none.arrays.keys().any(|k| k.starts_with("parts/")));
+    // Of a press and of a stamping: rows at 0, 0.5 and 1 s.
+    let rows = |ways: [f64; 3]| (vec![3], ways.to_vec());
+    formed
+        .arrays
+        .insert("history/holder_travel".into(), rows([0.0, 1e-3, 3e-3]));
+    formed
+        .arrays
+        .insert("history/parts/pad/way".into(), rows([2e-3, 1e-3, 0.0]));
+    let ply = formed.body("ply_1");
+    formed.bodies.push(MemoryBody {
+        name: "pad".into(),
+        points: ply.points.clone(),
+        nodes_per_cell: 4,
+        cells: ply.cells.clone(),
+        frames: ply.frames.clone(),
+        ..MemoryBody::default()
+    });
+    let late = json!({"start_time": 0.6, "slower": 2.0});
+    let late = interpolate(&formed, parameters(late), &[1]).unwrap();
+    for (name, expected) in [
+        ("parts/time", [1.0, 2.0]),
+        ("parts/holder/way", [1e-3, 3e-3]),
+        ("parts/pad/way", [1e-3, 0.0]),
+    ] {
+        assert_eq!(late.arrays[name].1, expected, "{name}");
+    }
+    let whole = interpolate(&formed, parameters(json!({})), &[1]).unwrap();
+    assert_eq!(whole.arrays["parts/time"].1, [0.0, 0.5, 1.0]);
+    formed
+        .arrays
+        .insert("history/holder_travel".into(), (vec![2], vec![0.0; 2]));
+    let torn = interpolate(&formed, parameters(json!({})), &[1]).unwrap_err();
+    assert!(torn.contains("history/holder_travel 2"), "{torn}");
+}
+
+#[test]
+fn a_zone_across_a_notch_follows_the_coarse_motion_at_its_cut_and_not_at_the_notch() {
+    let mut formed = coarse(0.0);
+    let notched = json!([
+        [-0.24, -0.15],
+        [0.24, -0.15],
+        [0.24, 0.15],
+        [0.08, 0.15],
+        [0.05, 0.05],
+        [0.02, 0.15],
+        [-0.24, 0.15]
+    ]);
+    formed.attributes["sheets"][1]["outline"] = notched;
+    // Zone B, from 0 to 100 mm along x and y: the notch ends in it.
+    let out = interpolate(&formed, json!({"element_size": 0.005}), &[1]).unwrap();
+    let body = out.body("ply_1");
+    let (_, nodes) = &out.arrays["ply_1/driven_nodes"];
+    let (_, position) = &out.arrays["ply_1/position"];
+    let k = nodes.len();
+    for (f, &t) in TIMES.iter().enumerate() {
+        for (i, &node) in nodes.iter().enumerate() {
+            let expected = motion(body.points[node as usize], t);
+            let own = &position[(f * k + i) * 3..][..3];
+            let off = (0..3)
+                .map(|d| (own[d] - expected[d]).abs())
+                .fold(0.0, f64::max);
+            assert!(off < 1e-9, "{own:?} {expected:?}");
+        }
+    }
+    let tip = |n: u32| {
+        let [x, y, _] = body.points[n as usize];
+        (x - 0.05).hypot(y - 0.05) < 1e-9
+    };
+    assert!(
+        (0..body.points.len() as u32).any(tip),
+        "a node in the notch's corner"
+    );
+    assert!(!nodes.iter().any(|n| tip(*n as u32)), "which is free");
+}

@@ -46,11 +46,11 @@ impl Drawn {
         self.pressed().is_some()
     }
 
-    /// Its table, of one that follows one: way (m) over time (s).
-    pub fn table(&self) -> Option<MonotoneCubic> {
+    /// Its table, of one that follows one: way (m) over time (s), in a process that is `slower` by that factor.
+    pub fn table(&self, slower: f64) -> Option<MonotoneCubic> {
         match self.words.as_ref()?.motion.as_ref()? {
             PartMotion::Table(rows) => {
-                let rows = rows.iter().map(|r| (r.time.si(), r.way.si()));
+                let rows = rows.iter().map(|r| (slower * r.time.si(), r.way.si()));
                 let (times, ways) = rows.unzip();
                 Some(MonotoneCubic::new(times, ways))
             }
@@ -68,7 +68,7 @@ impl Drawn {
 
     /// Where it is at a time (s), as far as that is known before (m).
     pub fn shift(&self, t: f64) -> Vec3 {
-        let way = self.table().map_or(0.0, |table| table.at(t));
+        let way = self.table(1.0).map_or(0.0, |table| table.at(t));
         self.outwards().map(|c| c * way)
     }
 }

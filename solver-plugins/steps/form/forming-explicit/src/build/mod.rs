@@ -3,14 +3,17 @@
 pub mod apart;
 pub mod bag;
 pub mod bag_contacts;
+pub mod dies;
 pub mod drawn;
 pub mod feedback;
 pub mod films;
+pub mod grips;
 pub mod layout;
 pub mod plates;
 pub mod press;
 pub mod stamping;
 pub mod travel;
+pub mod under;
 pub mod zone;
 
 pub use feedback::feed_back;

@@ -46,25 +46,15 @@ pub fn build_press(p: &Parameters, press: &Press, components: &dyn Components) -
     }
     let settings = p.step_settings();
     let mut model = Model::mirrored(parts.points, parts.specs, settings, parts.mirrors)?;
-    model.set_body_acceleration([
-        0.0,
-        0.0,
-        match press.weight {
-            None => 0.0,
-            Some(Towards::Die) => STANDARD_GRAVITY,
-            Some(Towards::Holder) => -STANDARD_GRAVITY,
-        },
-    ]);
+    model.set_body_acceleration([0.0, 0.0, fall(press.weight)]);
     let rigid = rigid_parts(&plates, tool.field);
-    add_contacts(&mut model, &stack, parts.placed, &rigid, p)?;
+    let placed = of_all_nodes(parts.placed, &model);
+    add_contacts(&mut model, &stack, &placed, &rigid, p)?;
     model.add_plane_contacts(&p.contact_settings());
     let mut load = press_load(press, &plates, &model);
     load.apply(&mut model, 0.0);
     let reference = model.start().clone();
-    // Largest distance of a point from the axis (m).
-    let from_axis = |q: &Vec3| q[0].fixed_hypot(q[1]);
-    let reach = reference.iter().map(from_axis).fold(0.0, f64::max);
-    let (rigid, errors) = shown(&plates, reach);
+    let (rigid, errors) = shown(&plates, reach(&reference));
     let field_errors = [(RigidName::Tool, tool.error)]
         .into_iter()
         .chain(errors)
@@ -87,8 +77,23 @@ pub fn build_press(p: &Parameters, press: &Press, components: &dyn Components) -
     })
 }
 
+/// Acceleration of free fall along z (m/s2).
+pub fn fall(weight: Option<Towards>) -> f64 {
+    match weight {
+        None => 0.0,
+        Some(Towards::Die) => STANDARD_GRAVITY,
+        Some(Towards::Holder) => -STANDARD_GRAVITY,
+    }
+}
+
+/// Largest distance of a point from the axis (m).
+pub fn reach(points: &[Vec3]) -> f64 {
+    let from_axis = |q: &Vec3| q[0].fixed_hypot(q[1]);
+    points.iter().map(from_axis).fold(0.0, f64::max)
+}
+
 /// The plates as they are shown, out to a radius that covers `reach` (m), and by how much that is off.
-fn shown(plates: &Plates, reach: f64) -> (Vec<RigidBody>, Vec<(RigidName, FieldError)>) {
+pub fn shown(plates: &Plates, reach: f64) -> (Vec<RigidBody>, Vec<(RigidName, FieldError)>) {
     let of = |(name, plate): (RigidName, OpenPlate)| {
         let mesh = PlateMesh::new(&plate, reach);
         let error = (name.clone(), mesh.error_against(&plate));
@@ -103,7 +108,7 @@ fn shown(plates: &Plates, reach: f64) -> (Vec<RigidBody>, Vec<(RigidName, FieldE
 }
 
 /// What moves in the press, as it starts.
-fn press_load(press: &Press, plates: &Plates, model: &Model) -> PressLoad {
+pub fn press_load(press: &Press, plates: &Plates, model: &Model) -> PressLoad {
     let contacts_of = |part: RigidName| -> Vec<usize> {
         let all = model.rigid_contacts().iter().enumerate();
         all.filter(|(_, c)| part.is_of(&c.name))
@@ -116,12 +121,14 @@ fn press_load(press: &Press, plates: &Plates, model: &Model) -> PressLoad {
             force: force.si() / model.planes().copies() as f64,
             mass: HOLDER_MASS * model.mass().iter().sum::<f64>(),
             most: plates.thickness(),
+            guide: None,
             height: 0.0,
             velocity: 0.0,
         }),
         _ => None,
     };
     PressLoad {
+        begin: 0.0,
         stroke: Stroke {
             way: press.stroke.si(),
             forming: press.forming_time.si(),
@@ -134,19 +141,27 @@ fn press_load(press: &Press, plates: &Plates, model: &Model) -> PressLoad {
     }
 }
 
-/// Plies on each other, and on the rigid parts of a press.
-pub fn add_contacts(
-    model: &mut Model,
-    stack: &[StackSheet],
-    mut placed: Vec<Placed>,
-    rigid: &[RigidPart],
-    p: &Parameters,
-) -> Result<()> {
+/// Plies of which all nodes may be slaves: also those that stand for mirror images.
+pub fn of_all_nodes(mut placed: Vec<Placed>, model: &Model) -> Vec<Placed> {
     for ply in &mut placed {
         ply.slaves = ply.sheet.nodes(model).to_vec();
     }
+    placed
+}
+
+/// Plies on each other, and on the rigid parts of a press: of a whole scene, or those that a zone has.
+///
+/// # Errors
+/// When a friction coefficient is missing or makes no sense.
+pub fn add_contacts(
+    model: &mut Model,
+    stack: &[StackSheet],
+    placed: &[Placed],
+    rigid: &[RigidPart],
+    p: &Parameters,
+) -> Result<()> {
     let contacts = StackContacts::new(stack, p);
-    let plies = layers(&placed);
+    let plies = layers(placed);
     for pair in plies.windows(2) {
         contacts.add_pair(model, pair[1], pair[0], 1.0)?;
     }
@@ -167,7 +182,7 @@ pub fn add_contacts(
 }
 
 /// Punch, die, and holder if there is one.
-fn rigid_parts(plates: &Plates, punch: SignedDistanceGrid) -> Vec<RigidPart> {
+pub fn rigid_parts(plates: &Plates, punch: SignedDistanceGrid) -> Vec<RigidPart> {
     let part = |name: RigidName, surface: Arc<dyn RigidSurface>| RigidPart {
         surface,
         above: name == RigidName::Die,

@@ -4,29 +4,28 @@
 
 use crate::build::apart::{Apart, Reach, check_apart, check_reach};
 use crate::build::drawn::{Drawn, drawn};
-use crate::build::press::add_contacts;
+use crate::build::grips::grips;
+use crate::build::press::{add_contacts, of_all_nodes};
 use crate::build::travel::{Stop, stop};
+use crate::build::under::Under;
 use crate::error::{FormingError, Result};
 use crate::forming::Forming;
-use crate::load::{ForceInTime, Grip, Load, Motion, MovedPart, PressedPart, StampingLoad};
+use crate::load::{ForceInTime, Load, Motion, MovedPart, PressedPart, StampingLoad};
 use crate::request::Parameters;
 use crate::stack::{
     Components, Elements, PartSurface, Parts, RigidBody, RigidName, RigidPart, RigidShape,
     StackSheet, sheet, symmetry, tool,
 };
-use plyflow_fixed::FixedBits;
 use plyflow_mechanics::history::MonotoneCubic;
 use plyflow_mechanics::mirror::Planes;
 use plyflow_mechanics::model::Model;
 use plyflow_model::STANDARD_GRAVITY;
-use plyflow_model::scene::{ForceCourse, Gripper, PartMotion, Pressed, Side, Stamping, Vertical};
+use plyflow_model::scene::{ForceCourse, PartMotion, Pressed, Side, Stamping, Vertical};
 use std::sync::Arc;
 
 /// Mass of all parts that are pressed, over that of the plies, and the least that each of them has. A part is moved by what the contacts gave in
 /// the step before, as a node is, so that it is stable from a mass like that of the nodes it touches on.
 const PRESSED_MASS: f64 = 5.0;
-/// Share of what keeps a node stable that the spring of a gripper may take.
-const MOST_SPRING: f64 = 0.1;
 
 /// Builds the model of a stamping.
 ///
@@ -56,13 +55,15 @@ pub fn build_stamping(
     let rigid: Vec<RigidPart> = drawn.iter().map(contact_part).collect();
     let end = stamping.forming_time.si();
     let stops = stops(&drawn, end);
-    add_contacts(&mut model, &stack, parts.placed, &rigid, p)?;
+    let placed = of_all_nodes(parts.placed, &model);
+    add_contacts(&mut model, &stack, &placed, &rigid, p)?;
     model.add_plane_contacts(&p.contact_settings());
     let mut load = StampingLoad {
+        begin: 0.0,
         forming: end,
         settling: stamping.settling_time.si(),
-        parts: moved(&drawn, &stops, &model),
-        grips: grips(stamping, &model, p.time_step)?,
+        parts: moved(&drawn, &stops, &model, None)?,
+        grips: grips(stamping, &model, p.time_step, None)?,
         stops: told_stops(&drawn, &stops),
     };
     put(&load, &mut model);
@@ -117,7 +118,7 @@ fn laid(stamping: &Stamping, parts: &[Drawn], stack: &[StackSheet]) -> Result<f6
 }
 
 /// Acceleration of free fall along z (m/s2).
-fn fall(weight: Option<Vertical>) -> f64 {
+pub fn fall(weight: Option<Vertical>) -> f64 {
     match weight {
         None => 0.0,
         Some(Vertical::Up) => STANDARD_GRAVITY,
@@ -126,7 +127,7 @@ fn fall(weight: Option<Vertical>) -> f64 {
 }
 
 /// The part as the sheets meet it.
-fn contact_part(part: &Drawn) -> RigidPart {
+pub fn contact_part(part: &Drawn) -> RigidPart {
     RigidPart {
         name: part.name.clone(),
         surface: Arc::new(PartSurface(part.field.clone())),
@@ -137,7 +138,7 @@ fn contact_part(part: &Drawn) -> RigidPart {
 }
 
 /// The part as the artifact shows it; the scene's tool has its own place there.
-fn body(part: Drawn) -> Option<RigidBody> {
+pub fn body(part: Drawn) -> Option<RigidBody> {
     (part.name != RigidName::Tool).then(|| RigidBody {
         above: part.side == Side::Above,
         shape: RigidShape::Triangles(part.mesh),
@@ -164,7 +165,7 @@ fn blank_height(stamping: &Stamping, parts: &[Drawn], reach: &Reach) -> Result<f
 }
 
 /// Where the parts stop that are pressed; none of others.
-fn stops(parts: &[Drawn], end: f64) -> Vec<Option<Stop>> {
+pub fn stops(parts: &[Drawn], end: f64) -> Vec<Option<Stop>> {
     let of = |(k, part): (usize, &Drawn)| {
         let travel = part.pressed()?.travel;
         Some(match travel {
@@ -207,49 +208,56 @@ fn without_partner(parts: &[Drawn], stops: &[Option<Stop>]) -> Vec<String> {
     parts.iter().zip(stops).filter_map(alone).collect()
 }
 
-/// How the parts move. `stops`: by part, where it stops if it is pressed.
-fn moved(parts: &[Drawn], stops: &[Option<Stop>], model: &Model) -> Vec<MovedPart> {
+/// How the parts move; in a `zone`, as the run of the whole recorded it of those that are pressed. `stops`: by part, where it stops if it is pressed.
+///
+/// # Errors
+/// When a zone's boundary does not tell the way of such a part.
+pub fn moved(
+    parts: &[Drawn],
+    stops: &[Option<Stop>],
+    model: &Model,
+    zone: Option<&Under<'_>>,
+) -> Result<Vec<MovedPart>> {
+    let (slower, begin) = zone.map_or((1.0, 0.0), |z| (z.input.slower, z.input.time[0]));
     let copies = model.planes().copies() as f64;
     let plies: f64 = model.mass().iter().sum();
     let pressed = parts.iter().filter(|p| p.is_pressed()).count().max(1);
     let usual = plies * (PRESSED_MASS / pressed as f64).max(1.0);
-    let motion = |part: &Drawn, stop: &Option<Stop>| match part
-        .words
-        .as_ref()
-        .and_then(|w| w.motion.as_ref())
-    {
-        None => Motion::Still,
-        Some(PartMotion::Table(_)) => part.table().map_or(Motion::Still, Motion::Table),
-        Some(PartMotion::Pressed(words)) => Motion::Pressed(PressedPart {
+    let motion = |part: &Drawn, stop: &Option<Stop>| -> Result<Motion> {
+        let words = part.words.as_ref().and_then(|w| w.motion.as_ref());
+        let table = || part.table(slower).map(Motion::Table);
+        let Some(PartMotion::Pressed(words)) = words else {
+            return Ok(words.and_then(|_| table()).unwrap_or(Motion::Still));
+        };
+        let guide = zone.map(|z| z.guide_of(part)).transpose()?;
+        Ok(Motion::Pressed(PressedPart {
             // What is given holds the whole.
-            force: force(words, copies),
+            force: force(words, copies, slower),
             spring: words.spring.map_or(0.0, |s| s.si()) / copies,
             travel: stop.as_ref().map_or(0.0, |s| s.travel),
             mass: words.mass.map_or(usual, |m| m.si() / copies),
-        }),
+            guide,
+        }))
     };
     let of = |(part, stop): (&Drawn, &Option<Stop>)| {
         let all = model.rigid_contacts().iter().enumerate();
         let contacts = all.filter(|(_, c)| part.name.is_of(&c.name));
         let contacts = contacts.map(|(k, _)| k).collect();
-        MovedPart::new(
-            part.name.clone(),
-            part.outwards(),
-            contacts,
-            motion(part, stop),
-        )
+        let (name, outwards) = (part.name.clone(), part.outwards());
+        let motion = motion(part, stop)?;
+        Ok(MovedPart::new(name, outwards, contacts, motion, begin))
     };
     parts.iter().zip(stops).map(of).collect()
 }
 
-fn force(words: &Pressed, copies: f64) -> ForceInTime {
+fn force(words: &Pressed, copies: f64, slower: f64) -> ForceInTime {
     match &words.force {
         ForceCourse::Value(force) => ForceInTime::Grown(force.si() / copies),
         ForceCourse::Course(course) => {
             let rows = course
                 .table
                 .iter()
-                .map(|r| (r.time.si(), r.force.si() / copies));
+                .map(|r| (slower * r.time.si(), r.force.si() / copies));
             let (times, forces) = rows.unzip();
             ForceInTime::Course(MonotoneCubic::new(times, forces))
         }
@@ -257,61 +265,10 @@ fn force(words: &Pressed, copies: f64) -> ForceInTime {
 }
 
 /// Puts the parts where they start, at rest.
-fn put(load: &StampingLoad, model: &mut Model) {
+pub fn put(load: &StampingLoad, model: &mut Model) {
     for part in &load.parts {
         for c in &part.contacts {
             model.rigid_contacts_mut()[*c].motion.shift = part.outwards.map(|o| o * part.way);
         }
     }
-}
-
-/// The nodes of grippers, with their shares of the force by mass.
-fn grips(stamping: &Stamping, model: &Model, dt: f64) -> Result<Vec<Grip>> {
-    let all = stamping.grippers.iter().enumerate();
-    all.map(|(k, words)| grip(k, words, model, dt)).collect()
-}
-
-fn grip(k: usize, words: &Gripper, model: &Model, dt: f64) -> Result<Grip> {
-    let at = format!("process.stamping.grippers[{k}]");
-    let sheet = model.sheets().iter().find(|s| s.name == words.ply);
-    let sheet = sheet.ok_or_else(|| {
-        FormingError::Scene(format!("{at}.ply: no ply is called `{}`", words.ply))
-    })?;
-    let [x, y] = words.centre.map(|c| c.si());
-    let half = [0.5 * words.length.si(), 0.5 * words.width.si()];
-    let start = model.start();
-    let inside = |n: &&u32| {
-        let p = start[**n as usize];
-        (p[0] - x).abs() <= half[0] + 1e-9 && (p[1] - y).abs() <= half[1] + 1e-9
-    };
-    let nodes: Vec<u32> = sheet.nodes.iter().filter(inside).copied().collect();
-    let mass = |n: &u32| model.mass()[*n as usize];
-    let whole: f64 = nodes.iter().map(mass).sum();
-    if nodes.is_empty() {
-        return Err(FormingError::Scene(format!(
-            "{at}: no node of `{}` lies in its rectangle of {:.1} x {:.1} mm about ({:.1}, {:.1}) mm; expected one as large as an element, on the ply",
-            words.ply,
-            2e3 * half[0],
-            2e3 * half[1],
-            1e3 * x,
-            1e3 * y
-        )));
-    }
-    let spring = words.spring.map_or(0.0, |s| s.si());
-    let most = MOST_SPRING * whole / (dt * dt);
-    if spring > most {
-        return Err(FormingError::Scene(format!(
-            "{at}.spring: given {spring:.3e} N/m; expected at most {most:.3e} N/m, which the {} nodes that it holds can follow in steps of {dt:.2e} s: \
-             take a larger place, or a smaller `time_step`",
-            nodes.len()
-        )));
-    }
-    let (s, c) = words.pull.si().fixed_sin_cos();
-    let of = |n: u32| (n, mass(&n) / whole, start[n as usize]);
-    Ok(Grip {
-        nodes: nodes.into_iter().map(of).collect(),
-        pull: [c, s, 0.0],
-        force: words.force.si(),
-        spring,
-    })
 }

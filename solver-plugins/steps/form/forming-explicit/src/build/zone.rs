@@ -2,6 +2,7 @@
 
 use crate::boundary::{Beginning, CutDrive};
 use crate::build::bag_contacts::add_contacts;
+use crate::build::dies::{Dies, Sheets, in_press, in_stamping};
 use crate::error::{FormingError, Result};
 use crate::forming::Forming;
 use crate::load::{Cycle, Load};
@@ -14,6 +15,7 @@ use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::model::Model;
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_model::scene::{DoubleDiaphragm, Process, Scene, SheetKind};
+use plyflow_tooling::RigidTool;
 
 /// Builds the model of a zone.
 ///
@@ -24,37 +26,36 @@ pub fn build_local(
     input: LocalInput,
     components: &dyn Components,
 ) -> Result<Forming> {
-    let process = process_of(&p.scene)?;
     let stack = stack_of(&p.scene, &input)?;
     if input.time.len() < 2 {
         let text = "the boundary has fewer than two frames";
         return Err(FormingError::Input(text.into()));
     }
-    let last = input.time.len() - 1;
     let (parts, cut) = sheets_of(&input, &stack, &Elements { p, components })?;
     let start = Beginning::of_zone(&stack, &input.sheets, input.time[0])?;
     let tool = tool::rigid(p)?;
-    let cycle = Cycle::new(process, [input.frame[0], input.frame[last]]).slowed(input.slower);
     let mut model = Model::new(parts.points, parts.specs, p.step_settings())?;
-    let mut surfaces = ToolSurfaces::new(tool.field);
-    add_contacts(&mut model, &stack, &parts.placed, p, &mut surfaces)?;
+    let sheets = Sheets {
+        stack: &stack,
+        placed: &parts.placed,
+        input: &input,
+    };
+    let dies = match &p.scene.process {
+        Process::DoubleDiaphragm(process) => in_bag(p, process, &tool, &sheets, &mut model),
+        Process::Press(press) => in_press(p, press, &tool, &sheets, &mut model),
+        Process::Stamping(stamping) => in_stamping(p, stamping, &tool, &sheets, &mut model),
+    }?;
     model.set_driven(cut.nodes, Box::new(cut.drive));
     let reference = model.start().clone();
     Ok(Forming {
         model,
-        load: Load::Given {
-            time: input.time,
-            cavity: input.cavity,
-            bag: input.bag,
-            frame: input.frame,
-            cycle,
-        },
+        load: dies.load,
         stack,
         bodies: parts.bodies,
         reference,
         tool: tool.mesh,
-        rigid: Vec::new(),
-        field_errors: vec![(RigidName::Tool, tool.error)],
+        rigid: dies.rigid,
+        field_errors: dies.field_errors,
         placement: tool.placement,
         tool_warnings: tool.warnings,
         zone: Some(input.zone),
@@ -64,17 +65,34 @@ pub fn build_local(
     })
 }
 
-/// The process of a scene of which a zone can be run by itself.
-fn process_of(scene: &Scene) -> Result<&DoubleDiaphragm> {
-    match &scene.process {
-        Process::DoubleDiaphragm(process) => Ok(process),
-        Process::Press(_) | Process::Stamping(_) => Err(FormingError::Scene(format!(
-            "scene '{}' is formed by a {}; local runs are built for double_diaphragm only. Run the whole scene with \
-             bending elements instead: leave out the boundary",
-            scene.name,
-            scene.process.word()
-        ))),
+/// Puts a zone between films over the tool, under the pressures of the run of the whole.
+fn in_bag(
+    p: &Parameters,
+    process: &DoubleDiaphragm,
+    tool: &RigidTool,
+    sheets: &Sheets<'_>,
+    model: &mut Model,
+) -> Result<Dies> {
+    let input = sheets.input;
+    if input.cavity.len() != input.time.len() {
+        let text = "the boundary does not tell the pressure in the cavity over time, which presses on a zone between films; run its step again, on a run of this scene";
+        return Err(FormingError::Input(text.into()));
     }
+    let last = input.time.len() - 1;
+    let cycle = Cycle::new(process, [input.frame[0], input.frame[last]]).slowed(input.slower);
+    let mut surfaces = ToolSurfaces::new(tool.field.clone());
+    add_contacts(model, sheets.stack, sheets.placed, p, &mut surfaces)?;
+    Ok(Dies {
+        load: Load::Given {
+            time: input.time.clone(),
+            cavity: input.cavity.clone(),
+            bag: input.bag.clone(),
+            frame: input.frame.clone(),
+            cycle,
+        },
+        rigid: Vec::new(),
+        field_errors: vec![(RigidName::Tool, tool.error)],
+    })
 }
 
 /// Those sheets of the scene that the zone has, bottom to top, one on the other.
@@ -84,10 +102,17 @@ fn stack_of(scene: &Scene, input: &LocalInput) -> Result<Vec<StackSheet>> {
     let mut stack: Vec<_> = whole.into_iter().filter(|s| has(&s.scene.name)).collect();
     // A ply that does not reach into the zone holds nothing off the tool there.
     sheet::lay(&mut stack);
-    if stack.len() < 3 {
+    let bagged = matches!(scene.process, Process::DoubleDiaphragm(_));
+    let plies = stack.iter().filter(|s| s.is_ply()).count();
+    let films = stack.len() - plies;
+    if plies == 0 || (bagged && films != 2) {
+        let expected = match bagged {
+            true => "both diaphragms and at least one ply",
+            false => "at least one ply",
+        };
         let names: Vec<&str> = input.sheets.iter().map(|s| s.name.as_str()).collect();
         return Err(FormingError::Input(format!(
-            "the zone needs both diaphragms and at least one ply of scene '{}'; its boundary has: {}",
+            "the zone needs {expected} of scene '{}'; its boundary has: {}",
             scene.name,
             names.join(", ")
         )));

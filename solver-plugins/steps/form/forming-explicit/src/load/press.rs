@@ -1,5 +1,6 @@
 //! What moves in a press: a rising punch, and a blank holder that a force presses towards the die.
 
+use crate::load::guide::Guide;
 use plyflow_mechanics::archive::{Archive, ArchiveError};
 use plyflow_mechanics::backend::Loaded;
 use plyflow_mechanics::contact::RigidMotion;
@@ -25,6 +26,13 @@ pub struct Stroke {
 }
 
 impl Stroke {
+    /// Makes all of it take `factor` times as long.
+    pub fn slow(&mut self, factor: f64) {
+        self.forming *= factor;
+        self.ramp *= factor;
+        self.settling *= factor;
+    }
+
     /// Way still to go (m) at time t (s).
     pub fn left(&self, t: f64) -> f64 {
         self.way - constant_speed_way(t, self.way, self.forming, self.ramp)
@@ -40,15 +48,34 @@ pub struct HeldByForce {
     pub mass: f64,
     /// Height at which it meets the die (m): nothing else stops it once the plies have left it.
     pub most: f64,
+    /// In a zone.
+    pub guide: Option<Guide>,
     /// Its way towards the die (m).
     pub height: f64,
     /// (m/s).
     pub velocity: f64,
 }
 
+impl HeldByForce {
+    /// What presses it (N) at time `t` (s), of its whole force there.
+    fn pressing(&self, whole: f64, t: f64) -> f64 {
+        match &self.guide {
+            None => whole,
+            Some(guide) => guide.force(whole, guide.way.at(t) - self.height),
+        }
+    }
+}
+
+/// Mean speed (m/s) of what was at `before` (m) a step of `dt` (s) ago: none of what has not moved yet.
+fn speed(at: f64, before: f64, dt: f64) -> f64 {
+    if dt > 0.0 { (at - before) / dt } else { 0.0 }
+}
+
 /// What moves in a press.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressLoad {
+    /// When the run begins (s).
+    pub begin: f64,
     /// The punch.
     pub stroke: Stroke,
     /// Numbers of its contacts in [`Model::rigid_contacts`].
@@ -71,15 +98,7 @@ impl PressLoad {
             .map_or(height, |c| on.rigid_motion(*c).shift[2]);
         let moved = |height: f64, before: f64| RigidMotion {
             shift: [0.0, 0.0, height],
-            velocity: [
-                0.0,
-                0.0,
-                if dt > 0.0 {
-                    (height - before) / dt
-                } else {
-                    0.0
-                },
-            ],
+            velocity: [0.0, 0.0, speed(height, before, dt)],
         };
         for c in &self.punch {
             on.set_rigid_motion(*c, moved(height, before));
@@ -87,7 +106,8 @@ impl PressLoad {
         let Some(held) = &mut self.held else { return };
         // The sheets' resistance of the last step: a holder many times their mass barely moves in one.
         let resistance: f64 = (self.holder.iter()).map(|c| on.rigid_force(*c)[2]).sum();
-        let force = held.force * smooth_step(t, 0.0, HOLD_RISE * self.stroke.forming);
+        let whole = held.force * smooth_step(t, 0.0, HOLD_RISE * self.stroke.forming);
+        let force = held.pressing(whole, t);
         let drag = HOLDER_DAMPING * held.mass * held.velocity;
         held.velocity += (force - resistance - drag) / held.mass * dt;
         let before = held.height;

@@ -50,7 +50,9 @@ impl Load {
     pub fn start(&self) -> f64 {
         match self {
             Self::Given { time, .. } => time[0],
-            _ => 0.0,
+            Self::Press(p) => p.begin,
+            Self::Stamping(s) => s.begin,
+            Self::Process { .. } => 0.0,
         }
     }
 

@@ -3,6 +3,7 @@
 //! The way of a part counts away from the sheets, from where the part is drawn. A part that is pressed is a mass on a straight line: its force
 //! and its spring press it towards the sheets up to its stop, and the plies push it back.
 
+use crate::load::guide::Guide;
 use crate::stack::RigidName;
 use plyflow_geometry::vec3::{Vec3, dot, scale, sub};
 use plyflow_mechanics::archive::{Archive, ArchiveError};
@@ -56,6 +57,19 @@ pub struct PressedPart {
     pub travel: f64,
     /// (kg); likewise.
     pub mass: f64,
+    /// In a zone.
+    pub guide: Option<Guide>,
+}
+
+impl PressedPart {
+    /// What presses it (N) at time `t` (s) and where it is `way` (m) off its place.
+    fn pressing(&self, t: f64, forming: f64, way: f64) -> f64 {
+        let whole = (self.force.at(t, forming) + self.spring * way).max(0.0);
+        match &self.guide {
+            None => whole,
+            Some(guide) => guide.force(whole, way - guide.way.at(t)),
+        }
+    }
 }
 
 /// A rigid part and how it moves.
@@ -78,8 +92,14 @@ pub struct MovedPart {
 }
 
 impl MovedPart {
-    /// At the start.
-    pub fn new(name: RigidName, outwards: Vec3, contacts: Vec<usize>, motion: Motion) -> Self {
+    /// At the time `begin` (s).
+    pub fn new(
+        name: RigidName,
+        outwards: Vec3,
+        contacts: Vec<usize>,
+        motion: Motion,
+        begin: f64,
+    ) -> Self {
         let mut part = Self {
             name,
             outwards,
@@ -89,7 +109,7 @@ impl MovedPart {
             rate: 0.0,
             largest: 0.0,
         };
-        part.way = part.drawn_at(0.0);
+        part.way = part.drawn_at(begin);
         part
     }
 
@@ -97,7 +117,8 @@ impl MovedPart {
     pub fn drawn_at(&self, t: f64) -> f64 {
         match &self.motion {
             Motion::Table(table) => table.at(t),
-            Motion::Still | Motion::Pressed(_) => 0.0,
+            Motion::Pressed(pressed) => pressed.guide.as_ref().map_or(0.0, |g| g.way.at(t)),
+            Motion::Still => 0.0,
         }
     }
 
@@ -120,9 +141,9 @@ impl MovedPart {
             Motion::Still => return,
             Motion::Table(table) => self.way = table.at(t),
             Motion::Pressed(pressed) => {
-                let force = pressed.force.at(t, forming) + pressed.spring * self.way;
+                let force = pressed.pressing(t, forming, self.way);
                 let drag = PRESSED_DAMPING * pressed.mass * self.rate;
-                self.rate += (back - force.max(0.0) - drag) / pressed.mass * dt;
+                self.rate += (back - force - drag) / pressed.mass * dt;
                 self.way += self.rate * dt;
                 if self.way <= -pressed.travel {
                     (self.way, self.rate) = (-pressed.travel, 0.0);
@@ -153,7 +174,7 @@ impl MovedPart {
 /// A gripper on some nodes of a ply.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grip {
-    /// Nodes, each with its share of the force and its place at the start (m).
+    /// Nodes, each with its share of the force and its place at the start (m); none where it holds no part of a zone.
     pub nodes: Vec<(u32, f64, Vec3)>,
     /// Unit vector of its pull.
     pub pull: Vec3,
@@ -195,6 +216,8 @@ impl Grip {
 /// What moves and pulls in a stamping.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StampingLoad {
+    /// When the run begins (s).
+    pub begin: f64,
     /// Duration of what moves (s).
     pub forming: f64,
     /// What follows (s).

@@ -74,7 +74,8 @@ pub fn warnings(forming: &Forming, outcome: &Outcome, now: &[Penetration]) -> Ve
             100.0 * LARGEST_FIBRE_STRAIN
         ));
     }
-    let stamping = forming.load.stamping();
+    // Of a zone most parts are elsewhere.
+    let stamping = forming.load.stamping().filter(|_| forming.zone.is_none());
     warnings.extend(stamping.into_iter().flat_map(StampingLoad::never_touched));
     if forming.load.press().is_some_and(PressLoad::holder_is_bare) {
         warnings.push(

@@ -1,6 +1,8 @@
 //! What other runs give: how the cut of a zone moves, and where nodes of a whole scene go.
 
+use crate::error::{FormingError, Result};
 use plyflow_geometry::vec3::Vec3;
+use plyflow_mechanics::history::MonotoneCubic;
 use plyflow_model::artifact::Zone;
 
 /// Where a sheet is when its zone begins late, and how it came there.
@@ -39,6 +41,17 @@ pub struct LocalSheet {
     pub start: Option<Start>,
 }
 
+/// Where a rigid part was in the run that drives a zone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordedWay {
+    /// Its name.
+    pub name: String,
+    /// Times (s), which ascend.
+    pub time: Vec<f64>,
+    /// Its way there, as its motion counts it (m).
+    pub way: Vec<f64>,
+}
+
 /// What a boundary artifact gives.
 #[derive(Debug, Clone)]
 pub struct LocalInput {
@@ -52,12 +65,32 @@ pub struct LocalInput {
     pub bag: Vec<f64>,
     /// Frame height (m).
     pub frame: Vec<f64>,
+    /// Of a press and a stamping: ways of the parts that are pressed.
+    pub ways: Vec<RecordedWay>,
     /// The zone, as its artifact describes it.
     pub zone: Zone,
     /// Element size (m).
     pub element_size: f64,
     /// How many times slower than the scene says the process goes on; the times are stretched already.
     pub slower: f64,
+}
+
+impl LocalInput {
+    /// How the part of that name, which is pressed, moved in the run of the whole.
+    ///
+    /// # Errors
+    /// When that is not told, or at one time alone.
+    pub fn way_of(&self, name: &str) -> Result<MonotoneCubic> {
+        let told = self.ways.iter().find(|w| w.name == name);
+        let told = told.filter(|w| w.time.len() > 1 && w.time.len() == w.way.len());
+        let told = told.ok_or_else(|| {
+            FormingError::Input(format!(
+                "the part '{name}' is pressed, and the boundary does not tell how it moved in the run of the whole, as it does in a zone; expected its way over \
+                 time. Run the run of the whole and the boundary's step again, with this version"
+            ))
+        })?;
+        Ok(MonotoneCubic::new(told.time.clone(), told.way.clone()))
+    }
 }
 
 /// What an artifact feeds back: where nodes of the coarse plies go.

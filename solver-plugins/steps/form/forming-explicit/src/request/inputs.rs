@@ -1,12 +1,12 @@
 //! What the step is given by others: an element size, zones, the boundary of a zone.
 
 use crate::error::{FormingError, Result};
-use crate::request::cut::{LocalInput, LocalSheet, Start};
+use crate::request::cut::{LocalInput, LocalSheet, RecordedWay, Start};
 use crate::request::parameters::Parameters;
 use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{Boundary, MeshStudy, Rectangle, Zones};
 use plyflow_model::material::MaterialEntry;
-use plyflow_model::scene::{Scene, SheetKind};
+use plyflow_model::scene::{PartMotion, Process, Scene, SheetKind};
 use plyflow_sdk::{Host, Input, Log};
 
 /// The element size (m) that a mesh study advises, if there is one.
@@ -87,10 +87,33 @@ pub fn read_boundary(host: &Host, input: &Input, scene: &Scene) -> Result<LocalI
         frame: series("frame_height")?,
         time,
         sheets,
+        ways: read_ways(host, input, scene)?,
         zone: boundary.zone,
         element_size: boundary.element_size,
         slower: boundary.slower.unwrap_or(1.0),
     })
+}
+
+/// Ways of the parts of the scene that are pressed, as far as the boundary tells them.
+fn read_ways(host: &Host, input: &Input, scene: &Scene) -> Result<Vec<RecordedWay>> {
+    let names: Vec<&str> = match &scene.process {
+        Process::DoubleDiaphragm(_) => Vec::new(),
+        Process::Press(_) => vec!["holder"],
+        Process::Stamping(stamping) => (stamping.parts.iter())
+            .filter(|p| matches!(p.motion, Some(PartMotion::Pressed(_))))
+            .map(|p| p.name.as_str())
+            .collect(),
+    };
+    let path = |name: &str| format!("parts/{name}/way");
+    let told = |name: &&str| host.array_info(input, &path(name)).is_some();
+    let read = |name: &str| {
+        Ok(RecordedWay {
+            name: name.to_owned(),
+            time: host.array_f64(input, "parts/time")?.0,
+            way: host.array_f64(input, &path(name))?.0,
+        })
+    };
+    names.into_iter().filter(told).map(read).collect()
 }
 
 /// Whether a boundary is of this scene: its name, and what the run that it was made of told of its sheets.

@@ -1,6 +1,7 @@
 //! What the tests of whole runs share: components without a host, scenes, the run itself. No test uses all of it.
 #![allow(dead_code)]
 
+pub mod cut;
 pub mod depth;
 pub mod scenes;
 

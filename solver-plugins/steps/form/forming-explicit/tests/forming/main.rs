@@ -22,3 +22,4 @@ mod taken_up;
 mod tools;
 mod unstable;
 mod watch;
+mod zones;

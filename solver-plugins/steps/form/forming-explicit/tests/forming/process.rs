@@ -170,6 +170,7 @@ fn zone(p: &Parameters, begin: f64) -> Forming {
         cavity: vec![1e5; 2],
         bag: vec![1e5; 2],
         frame: vec![0.04; 2],
+        ways: Vec::new(),
         zone: Zone::new("A", [-0.03, -0.03, 0.03, 0.03]),
         element_size: 0.015,
         slower: 1.0,

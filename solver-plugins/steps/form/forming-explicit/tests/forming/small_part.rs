@@ -4,17 +4,16 @@
 //! 7.5 %, both over their bounds; and at 10 mm elements over a 30 mm high block the ledger is open by 4.7 %. The mesh
 //! here is 7 mm and the block 20 mm high so that what it does claim can be judged.
 
+use crate::common::cut::{Film, cut_out};
 use crate::common::scenes::bag;
 use crate::common::{BuiltIn, ComingAndGoing, Silent, form, form_before};
 use plyflow_forming_explicit::{
-    Feedback, Forming, HistoryRow, LocalInput, LocalSheet, Observer, Outcome, Parameters, Start,
-    build_global, build_local, feed_back, inverse_bilinear,
+    Feedback, Forming, HistoryRow, LocalInput, LocalSheet, Outcome, Parameters, build_global,
+    build_local, feed_back, inverse_bilinear,
 };
 use plyflow_geometry::vec3::{Vec3, add, norm, scale, sub};
-use plyflow_mechanics::energy::Ledger;
 use plyflow_mechanics::history::{linear, spline_slopes};
 use plyflow_mechanics::mesh::area_vector;
-use plyflow_sdk::StepError;
 use serde_json::json;
 
 fn parameters() -> Parameters {
@@ -132,41 +131,6 @@ fn a_ply_of_another_outline_is_formed_between_films_with_a_closed_ledger() {
     assert!((in_hole - (0.5 * film + 3e-4)).abs() < 1e-4, "{in_hole}");
 }
 
-/// Keeps where the plies are at the frames.
-#[derive(Default)]
-struct Film {
-    /// Whether the first frame ends the run.
-    short: bool,
-    time: Vec<f64>,
-    /// `[frames][bodies][nodes]` (m).
-    points: Vec<Vec<Vec<Vec3>>>,
-    /// How often a late start said that it is on its way, and how often it may.
-    settled: usize,
-    settles: Option<usize>,
-}
-
-impl Observer for Film {
-    fn frame(&mut self, forming: &Forming, time: f64) -> Result<(), StepError> {
-        self.time.push(time);
-        let bodies = forming.bodies.iter().map(|b| forming.points(b));
-        self.points.push(bodies.collect());
-        if self.short {
-            return Err("seen enough".into());
-        }
-        Ok(())
-    }
-    fn tick(&mut self, _: &Forming, _: &Ledger, _: f64) -> Result<(), StepError> {
-        Ok(())
-    }
-    fn settling(&mut self, _: &Forming) -> Result<(), StepError> {
-        self.settled += 1;
-        match self.settles {
-            Some(most) if self.settled > most => Err("stopped".into()),
-            _ => Ok(()),
-        }
-    }
-}
-
 /// The nodes of one ply that `wanted` picks, with the motion that a run gave them, moved by `extra` (m) as time goes.
 fn fed(
     forming: &Forming,
@@ -275,67 +239,6 @@ fn a_run_that_is_fed_its_own_motion_repeats_itself_and_one_that_is_fed_more_foll
     assert!(refused(fed(&first, &film, 0, deep, [0.0; 3])).contains("no ply of this scene"));
 }
 
-/// The part of a body within `reach` (m) of the axes, moved as a run of the whole moved it from the frame `first` on; its nodes
-/// there are driven where the body goes on. Gives also its nodes' numbers in the body.
-fn cut_out(
-    forming: &Forming,
-    film: &Film,
-    body: usize,
-    reach: [f64; 2],
-    first: usize,
-) -> (LocalSheet, Vec<u32>) {
-    let b = &forming.bodies[body];
-    let all = forming.reference_points(b);
-    let inside = |n: &u32| (0..2).all(|d| all[*n as usize][d].abs() < reach[d]);
-    let (kept, gone): (Vec<[u32; 4]>, Vec<[u32; 4]>) =
-        b.cells.iter().partition(|c| c.iter().all(inside));
-    let mut nodes: Vec<u32> = kept.iter().flatten().copied().collect();
-    nodes.sort_unstable();
-    nodes.dedup();
-    let own = |n: &u32| nodes.binary_search(n).ok().map(|k| k as u32);
-    let mut driven: Vec<u32> = gone.iter().flatten().filter_map(own).collect();
-    driven.sort_unstable();
-    driven.dedup();
-    let at = |frame: usize, k: &u32| film.points[frame][body][nodes[*k as usize] as usize];
-    let position: Vec<Vec<Vec3>> = (0..film.time.len())
-        .map(|f| driven.iter().map(|k| at(f, k)).collect())
-        .collect();
-    let flat: Vec<f64> = position.iter().flatten().flatten().copied().collect();
-    let slopes = spline_slopes(&film.time, &flat, 3 * driven.len());
-    let every: Vec<u32> = (0..nodes.len() as u32).collect();
-    let state = |f: usize| every.iter().map(|k| at(f, k)).collect::<Vec<Vec3>>();
-    let start = (first > 0).then(|| {
-        let span = film.time[first + 1] - film.time[first - 1];
-        let rate = |(a, b): (&Vec3, &Vec3)| scale(sub(*b, *a), 1.0 / span);
-        Start {
-            path: (1..=first).map(state).collect(),
-            velocity: state(first - 1)
-                .iter()
-                .zip(&state(first + 1))
-                .map(rate)
-                .collect(),
-        }
-    });
-    let sheet = LocalSheet {
-        name: b.name.clone(),
-        points: nodes.iter().map(|n| all[*n as usize]).collect(),
-        cells: kept.iter().map(|c| c.map(|n| own(&n).unwrap())).collect(),
-        position: position[first..].to_vec(),
-        velocity: slopes
-            .chunks_exact(3 * driven.len())
-            .skip(first)
-            .map(|r| r.as_chunks().0.to_vec())
-            .collect(),
-        driven,
-        normal: Vec::new(),
-        normal_rate: Vec::new(),
-        pull: Vec::new(),
-        stiffness: Vec::new(),
-        start,
-    };
-    (sheet, nodes)
-}
-
 /// A run of the whole part, of which zones are cut out.
 struct Whole {
     p: Parameters,
@@ -437,6 +340,7 @@ impl Whole {
             frame: of(|r| r.frame),
             sheets: (0..4).map(sheet).collect(),
             time,
+            ways: Vec::new(),
             zone: plyflow_model::artifact::Zone::new("A", [-0.03, -0.03, 0.03, 0.03]),
             element_size: 0.007,
             slower: 1.0,
@@ -445,13 +349,9 @@ impl Whole {
 
     fn part(&self, body: usize, first: usize) -> (LocalSheet, Vec<u32>) {
         let wider = if body == 0 || body == 3 { 0.02 } else { 0.0 };
-        cut_out(
-            &self.forming,
-            &self.film,
-            body,
-            [0.045 + wider, 0.05 + wider],
-            first,
-        )
+        let reach = [0.045 + wider, 0.05 + wider];
+        let inside = |x: Vec3| (0..2).all(|d| x[d].abs() < reach[d]);
+        cut_out(&self.forming, &self.film, body, &inside, first)
     }
 
     /// Runs a zone, to its end or (`short`) to its first frame.

@@ -7,7 +7,7 @@ use plyflow_mechanics::archive::Archive;
 use serde_json::{Value, json};
 
 /// A block with its flat top at 10 mm, under a ply of 0.3 mm; `stamping` says what else there is, and `change` has the last word.
-fn stamped(stamping: Value, change: impl FnOnce(&mut Value)) -> Parameters {
+pub fn stamped(stamping: Value, change: impl FnOnce(&mut Value)) -> Parameters {
     let mut all = json!({
         "scene": {
             "plyflow_scene": 1, "name": "stamped",
@@ -28,23 +28,23 @@ fn stamped(stamping: Value, change: impl FnOnce(&mut Value)) -> Parameters {
 }
 
 /// A block of 36 x 60 mm about x (m) that hangs with its face at `face` (m).
-fn pad(name: &str, x: f64, face: f64) -> Value {
+pub fn pad(name: &str, x: f64, face: f64) -> Value {
     json!({"name": name, "side": "above", "up": "-z", "centre": [format!("{x} m"), "0 m"], "foot": format!("{face} m"),
         "tool": {"flat": {"length": "0.036 m", "width": "0.06 m", "height": "0.01 m", "fillet": "0.002 m", "facet_size": "0.005 m"}}})
 }
 
 /// A block of 36 x 60 mm about x (m) that stands on z = 0 with its top at 10 mm.
-fn block(name: &str, x: f64) -> Value {
+pub fn block(name: &str, x: f64) -> Value {
     json!({"name": name, "side": "below", "centre": [format!("{x} m"), "0 m"],
         "tool": {"flat": {"length": "0.036 m", "width": "0.06 m", "height": "0.01 m", "fillet": "0.002 m", "facet_size": "0.005 m"}}})
 }
 
-fn with(mut part: Value, motion: Value) -> Value {
+pub fn with(mut part: Value, motion: Value) -> Value {
     part["motion"] = motion;
     part
 }
 
-fn process(parts: &[Value]) -> Value {
+pub fn process(parts: &[Value]) -> Value {
     json!({"forming_time": "0.08 s", "settling_time": "0.02 s", "parts": parts})
 }
 
