@@ -142,9 +142,12 @@ fn where_no_distance_is_judged_the_ply_is_grey_and_the_scale_does_not_see_it() {
         "the shear is known"
     );
     // The range is that of what is judged, and not the 50 mm beside the tool.
-    let ranges: Vec<f64> = (page.split("<b>mm</b>; values from ").skip(1))
-        .map(|rest| rest.split(" to ").nth(1).unwrap())
-        .map(|rest| rest.split([' ', '.']).next().unwrap().parse().unwrap())
+    let legend = "Distance of the ply from where it would lie on the tool";
+    let ranges: Vec<f64> = (page.match_indices(legend))
+        .map(|(at, _)| page[..at].rsplit_once("; values from ").unwrap().1)
+        .map(|range| range.split_once(" to ").unwrap().1)
+        .map(|to| to.split(' ').next().unwrap().trim_end_matches('.'))
+        .map(|to| to.parse().unwrap())
         .collect();
     assert!(
         !ranges.is_empty() && ranges.iter().all(|r| *r < 7.0),

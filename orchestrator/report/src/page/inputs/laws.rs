@@ -139,15 +139,19 @@ fn plot(
     (!plot.series.is_empty()).then_some(plot)
 }
 
-/// Angles (rad) and normalised forces (N/m) of one sign's yarns.
-fn yarns(shear: &Value) -> Option<(Vec<f64>, Vec<f64>)> {
+/// Angles (rad) and normalised forces (N/m) of one sign's yarns: points of a table, or of a formula, which has some at the angles `also`.
+fn yarns(shear: &Value, also: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
     let coefficients = list(&shear["coefficients"]);
     if coefficients.is_empty() {
         let table = &shear["table"];
         let points = (list(&table["angles"]), list(&table["forces"]));
         return (!points.0.is_empty() && points.0.len() == points.1.len()).then_some(points);
     }
-    let x = spread(shear["limit"].as_f64().unwrap_or(SHEAR_LIMIT));
+    let end = shear["limit"].as_f64().unwrap_or(SHEAR_LIMIT);
+    let mut x = spread(end);
+    x.extend(also.iter().filter(|g| **g <= end));
+    x.sort_by(f64::total_cmp);
+    x.dedup();
     let force = |g: &f64| coefficients.iter().rev().fold(0.0, |sum, c| sum * g + c);
     let y = x.iter().map(force).collect();
     Some((x, y))
@@ -187,13 +191,14 @@ fn turned(sign: f64, (x, y): (&[f64], &[f64])) -> (Vec<f64>, Vec<f64>) {
 
 /// Forces over the shear angle: of the yarns, and with the stitch where there is one.
 fn shear(with: &Value) -> Vec<Series<'static>> {
-    let shear = &with["shear"];
-    let Some(positive) = yarns(shear) else {
+    let (shear, stitch) = (&with["shear"], &with["stitch"]);
+    let (angles, forces) = (list(&stitch["angles"]), list(&stitch["forces"]));
+    let Some(positive) = yarns(shear, &angles) else {
         return Vec::new();
     };
     let own = shear["negative"]
         .is_object()
-        .then(|| yarns(&shear["negative"]));
+        .then(|| yarns(&shear["negative"], &angles));
     let negative = own.flatten().unwrap_or_else(|| positive.clone());
     let (mut x, mut y) = turned(-1.0, (&negative.0, &negative.1));
     x.reverse();
@@ -202,8 +207,6 @@ fn shear(with: &Value) -> Vec<Series<'static>> {
     x.extend(more.0);
     y.extend(more.1);
     let mut curves = vec![series("yarns", 0, Style::Line, (x, y))];
-    let stitch = &with["stitch"];
-    let (angles, forces) = (list(&stitch["angles"]), list(&stitch["forces"]));
     if angles.len() > 1 && angles.len() == forces.len() {
         let (sign, (x, y)) = match stitch["direction"] == "negative" {
             true => (-1.0, &negative),
@@ -211,6 +214,7 @@ fn shear(with: &Value) -> Vec<Series<'static>> {
         };
         let mut at: Vec<f64> = x.iter().chain(&angles).copied().collect();
         at.sort_by(f64::total_cmp);
+        at.dedup();
         let sum = |g: &f64| between(x, y, *g) + between(&angles, &forces, *g);
         let sum: Vec<f64> = at.iter().map(sum).collect();
         let name = "with the stitch, until it has failed";
