@@ -108,7 +108,7 @@ pub fn run(
     let internal = ledger.iter().map(Ledger::internal).fold(0.0, f64::max);
     let hourglass = ledger.iter().map(|l| l.hourglass).fold(0.0, f64::max);
     Ok(Outcome {
-        health: judge(&ledger),
+        health: judge(&ledger, 0.0),
         hourglass_ratio: if internal > 0.0 {
             hourglass / internal
         } else {

@@ -5,7 +5,7 @@ use crate::advance::late;
 use crate::course::{Course, HistoryRow, Observer, Outcome};
 use crate::error::{FormingError, Result};
 use crate::forming::Forming;
-use crate::judge::{absurd, diagnosis};
+use crate::judge::{absurd, diagnosis, scale};
 use crate::measure::keep_largest;
 use crate::request::Control;
 use crate::watch::Watch;
@@ -58,6 +58,8 @@ struct Run<'a> {
     crew: Crew,
     /// When it begins and when it ends (s).
     span: [f64; 2],
+    /// Energy (J) that is too little to judge.
+    least: f64,
     /// Whether what has brought it to its late start is still to be counted as work.
     is_late: bool,
 }
@@ -70,6 +72,7 @@ impl<'a> Run<'a> {
         observer: &'a mut dyn Observer,
     ) -> Result<Self> {
         let span = [forming.load.start(), forming.load.duration()];
+        let least = scale::too_little(forming);
         let mut course = Course::default();
         observer.resume(forming, &mut course)?;
         let mut is_late = false;
@@ -85,6 +88,7 @@ impl<'a> Run<'a> {
             observer,
             course,
             span,
+            least,
             is_late,
         })
     }
@@ -173,8 +177,9 @@ impl<'a> Run<'a> {
     fn write_row(&mut self) -> Result<()> {
         let energies = self.add_row();
         let (history, end) = (&self.course.history, self.span[1]);
-        let open = diagnosis::open_ledger(history, end, self.control.drift_bound);
-        if let Some(what) = open.or_else(|| absurd::flies(history, self.span)) {
+        let least = self.least;
+        let open = diagnosis::open_ledger(history, end, self.control.drift_bound, least);
+        if let Some(what) = open.or_else(|| absurd::flies(history, self.span, least)) {
             return Err(self.stopped(&what));
         }
         Ok(self.observer.tick(self.forming, &energies, end)?)
@@ -213,7 +218,7 @@ impl<'a> Run<'a> {
         let last = self.course.history.last();
         let source = last.and_then(|r| diagnosis::source(self.forming, r));
         let bound = self.control.kinetic_bound;
-        let mut outcome = Outcome::of(self.course, depths, cycles, bound, source);
+        let mut outcome = Outcome::of(self.course, depths, cycles, bound, self.least, source);
         let at_end = outcome.health.kinetic_ratio_at_end;
         let moving = diagnosis::still_moving(self.forming, at_end);
         let late = outcome.start_shift.and_then(late::too_late);

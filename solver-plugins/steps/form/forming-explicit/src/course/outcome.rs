@@ -29,16 +29,17 @@ pub struct Outcome {
 
 impl Outcome {
     /// Of a run that has come to its end after `cycles` steps. `kinetic_bound`: kinetic over internal energy above which it is marked.
-    /// `source`: whose contact energy unaccounted for comes from.
+    /// `least`: energy (J) that is too little to judge. `source`: whose contact energy unaccounted for comes from.
     pub fn of(
         course: Course,
         depths: Vec<PairDepth>,
         cycles: u64,
         kinetic_bound: f64,
+        least: f64,
         source: Option<String>,
     ) -> Self {
         let ledgers: Vec<Ledger> = course.history.iter().map(|r| r.ledger).collect();
-        let health = judge(&ledgers);
+        let health = judge(&ledgers, least);
         Self {
             warnings: warnings(&health, kinetic_bound, source.as_deref()),
             history: course.history,

@@ -182,14 +182,15 @@ fn check_places(forming: &Forming) -> Result<()> {
     Ok(())
 }
 
-/// What to say of sheets that have flown about for most of the process: kinetic energy far beyond all that is stored.
-pub fn flies(history: &[HistoryRow], [begin, end]: [f64; 2]) -> Option<String> {
+/// What to say of sheets that have flown about for most of the process: kinetic energy far beyond all that is stored. `least` (J) is
+/// too little to judge, see [`too_little`](crate::judge::scale::too_little).
+pub fn flies(history: &[HistoryRow], [begin, end]: [f64; 2], least: f64) -> Option<String> {
     let last = history.last()?;
     let over = (last.time - begin) / (end - begin);
     if history.len() < FEW_ROWS || over < MOST_OF_IT {
         return None;
     }
-    let fast = |r: &&HistoryRow| r.ledger.kinetic > FLIES * r.ledger.internal();
+    let fast = |r: &&HistoryRow| r.ledger.kinetic > FLIES * r.ledger.internal().max(least);
     let share = history.iter().filter(fast).count() as f64 / history.len() as f64 * over;
     (share > MOST_OF_IT).then(|| {
         format!(
@@ -237,7 +238,7 @@ mod tests {
         let history = |kinetic: &dyn Fn(usize) -> f64, rows: usize| -> Vec<HistoryRow> {
             (0..rows).map(|k| row(k as f64, kinetic(k))).collect()
         };
-        let told = flies(&history(&|_| 30.0, 60), [0.0, 100.0]).expect("told");
+        let told = flies(&history(&|_| 30.0, 60), [0.0, 100.0], 0.0).expect("told");
         assert!(told.contains("59 % of the process"), "{told}");
         // Not before half of it is over, not for a knock, not where the start alone is fast, and not for what is carried along.
         let silent: [(&dyn Fn(usize) -> f64, usize); 4] = [
@@ -246,8 +247,9 @@ mod tests {
             (&|k| if k < 45 { 90.0 } else { 0.1 }, 90),
             (&|_| 9.0, 90),
         ];
+        assert_eq!(flies(&history(&|_| 30.0, 60), [0.0, 100.0], 4.0), None);
         for (kinetic, rows) in silent {
-            assert_eq!(flies(&history(kinetic, rows), [0.0, 100.0]), None);
+            assert_eq!(flies(&history(kinetic, rows), [0.0, 100.0], 0.0), None);
         }
     }
 }

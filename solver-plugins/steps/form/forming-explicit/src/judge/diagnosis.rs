@@ -2,6 +2,7 @@
 
 use crate::course::HistoryRow;
 use crate::forming::Forming;
+use crate::judge::scale;
 use crate::measure::{Penetration, cell_strain};
 use crate::stack::sheet;
 use crate::words::in_mm;
@@ -16,9 +17,10 @@ const ROWS: usize = 3;
 const FIRST_ROWS: usize = 20;
 
 /// Energy unaccounted for, by row, over the largest work or internal energy so far, projected to the end of the process:
-/// work grows about with the square of time, and at the start there is hardly any to compare with.
-fn open_shares(history: &[HistoryRow], end: f64) -> Vec<f64> {
-    let mut work = 0.0f64;
+/// work grows about with the square of time, and at the start there is hardly any to compare with. `least` (J) is too little to
+/// judge, see [`scale`].
+fn open_shares(history: &[HistoryRow], end: f64, least: f64) -> Vec<f64> {
+    let mut work = least;
     (history.iter())
         .map(|r| {
             let l = &r.ledger;
@@ -32,12 +34,12 @@ fn open_shares(history: &[HistoryRow], end: f64) -> Vec<f64> {
         .collect()
 }
 
-/// What to say when the ledger has been open by more than `bound` for some rows.
-pub fn open_ledger(history: &[HistoryRow], end: f64, bound: f64) -> Option<String> {
+/// What to say when the ledger has been open by more than `bound` for some rows. `least` (J): what is too little to judge.
+pub fn open_ledger(history: &[HistoryRow], end: f64, bound: f64, least: f64) -> Option<String> {
     if history.len() < FIRST_ROWS {
         return None;
     }
-    let shares = open_shares(history, end);
+    let shares = open_shares(history, end, least);
     let open = shares
         .iter()
         .rev()
@@ -105,7 +107,8 @@ pub fn of(forming: &Forming, history: &[HistoryRow], what: &str) -> String {
         "{what}; seen at t = {t:.5} s of {end:.5} s ({}).",
         forming.load.phase(t)
     );
-    let shares = open_shares(history, end);
+    let least = scale::too_little(forming);
+    let shares = open_shares(history, end, least);
     let calm = shares.iter().rposition(|s| *s < OPENING);
     if let Some(row) = calm.map_or(history.first(), |i| history.get(i + 1)) {
         let _ = write!(
@@ -127,9 +130,9 @@ pub fn of(forming: &Forming, history: &[HistoryRow], what: &str) -> String {
         text.push_str(&d.text);
     }
     text.push_str(&fastest(forming));
-    let kinetic = history.last().map_or(0.0, |r| {
-        r.ledger.kinetic / r.ledger.internal().max(f64::MIN_POSITIVE)
-    });
+    let kinetic = history
+        .last()
+        .map_or(0.0, |r| r.ledger.kinetic / r.ledger.internal().max(least));
     let (cause, remedy) = likely(cell.as_ref(), deep.as_ref().map(|d| d.share), kinetic);
     let _ = write!(text, " Likely cause: {cause}. What to try: {remedy}.");
     text
@@ -347,7 +350,7 @@ mod tests {
     #[test]
     fn a_ledger_is_open_only_beyond_the_bound_and_for_some_rows() {
         let open = |drift: &dyn Fn(usize) -> f64, rows| {
-            open_ledger(&history(drift, rows), (rows - 1) as f64, 0.1)
+            open_ledger(&history(drift, rows), (rows - 1) as f64, 0.1, 0.0)
         };
         assert_eq!(open(&|_| 0.0, 50), None);
         assert_eq!(open(&|i| 0.05 * i as f64, 50), None);
@@ -355,10 +358,14 @@ mod tests {
         assert!(text.starts_with("20 % of the work"), "{text}");
         // The same share early on, when there will be nine times as much work.
         let early = history(|i| -0.2 * i as f64, 50);
-        assert_eq!(open_ledger(&early, 147.0, 0.1), None);
+        assert_eq!(open_ledger(&early, 147.0, 0.1, 0.0), None);
         // A knock, and what is open before there is any work.
         assert_eq!(open(&|i| if i == 48 { 30.0 } else { 0.0 }, 50), None);
         assert_eq!(open(&|_| 5.0, FIRST_ROWS - 1), None);
+        // Of what is too little to judge.
+        let light = history(|i| -0.2 * i as f64, 50);
+        assert!(open_ledger(&light, 49.0, 0.1, 50.0).is_some());
+        assert_eq!(open_ledger(&light, 49.0, 0.1, 150.0), None);
         // What is no number is not closed.
         assert!(open(&|i| if i > 40 { f64::NAN } else { 0.0 }, 50).is_some());
     }

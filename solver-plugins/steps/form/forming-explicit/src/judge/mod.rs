@@ -2,3 +2,4 @@
 
 pub mod absurd;
 pub mod diagnosis;
+pub mod scale;

@@ -124,8 +124,6 @@ fn a_pressed_part_gives_its_force_and_a_spring_what_it_is_pushed_back_by() {
 
 #[test]
 fn a_pressed_part_without_travel_goes_on_to_the_part_that_it_meets_and_the_plies_bear_its_force() {
-    // A ply that only rests takes nanojoules, of which a bound in per cent says nothing.
-    let resting = |p: &mut Value| p["drift_bound"] = json!(1e6);
     let force = json!({"pressed": {"force": "40 N"}});
     let travel = |forming: &Forming, name: &str| {
         let load = forming.load.stamping().unwrap();
@@ -136,7 +134,7 @@ fn a_pressed_part_without_travel_goes_on_to_the_part_that_it_meets_and_the_plies
     for (face, open) in [(0.0103, 0.3e-3), (0.0153, 5.3e-3)] {
         let p = stamped(
             process(&[with(pad("pad", 0.0, face), force.clone())]),
-            resting,
+            |_| {},
         );
         let forming = build_global(&p, &BuiltIn).unwrap();
         let found = travel(&forming, "pad");
@@ -151,7 +149,7 @@ fn a_pressed_part_without_travel_goes_on_to_the_part_that_it_meets_and_the_plies
     }
     let p = stamped(
         process(&[with(pad("pad", 0.0, 0.0103), force.clone())]),
-        resting,
+        |_| {},
     );
     let (forming, outcome) = form(&p, 1);
     let [[tool, _], [pad_force, way]] = outcome.history.last().unwrap().parts[..] else {
@@ -163,6 +161,36 @@ fn a_pressed_part_without_travel_goes_on_to_the_part_that_it_meets_and_the_plies
     );
     // The ply holds it: it is far from its stop.
     assert!(way < 0.0 && way > -0.1 * travel(&forming, "pad"), "{way}");
+}
+
+#[test]
+fn a_ply_that_only_rests_on_a_part_gives_it_its_weight_and_is_not_stopped_for_shares_of_nanojoules()
+{
+    let over =
+        json!({"table": [{"time": "0 s", "way": "0.005 m"}, {"time": "0.08 s", "way": "0 m"}]});
+    let mut process = process(&[with(pad("punch", 0.0, 0.0203), over)]);
+    process["weight"] = json!("down");
+    let p = stamped(process, |p| {
+        p["scene"]["sheets"][0] = ply("ply_1", &woven(), [0.032, 0.048], 0.0);
+    });
+    let (forming, outcome) = form(&p, 1);
+    let [_, [punch, _]] = outcome.history.last().unwrap().parts[..] else {
+        panic!("two parts");
+    };
+    let own: f64 = forming.model.own_masses().iter().sum();
+    let rows = &outcome.history[60..];
+    let tool = rows.iter().map(|r| r.parts[0][0]).sum::<f64>() / rows.len() as f64;
+    assert_eq!(punch, 0.0);
+    assert!(
+        (tool / (own * 9.80665) - 1.0).abs() < 0.01,
+        "{tool} N of {own} kg"
+    );
+    assert!(
+        outcome.health.peak_drift_ratio < 0.01,
+        "{:?}",
+        outcome.health
+    );
+    assert!(outcome.warnings.is_empty(), "{:?}", outcome.warnings);
 }
 
 #[test]
