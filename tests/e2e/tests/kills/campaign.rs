@@ -47,6 +47,16 @@ pub struct Count {
     pub leftovers: u64,
 }
 
+/// What a campaign that was stopped goes on with.
+#[derive(Debug, Default, Serialize, Deserialize)]
+struct Kept {
+    count: Count,
+    /// What was found.
+    said: Vec<String>,
+    /// The artifacts of the undisturbed run.
+    artifacts: Vec<String>,
+}
+
 /// A campaign of kills.
 pub struct Campaign<'a> {
     plan: &'a Plan,
@@ -86,13 +96,21 @@ impl Plan {
         let calm = self.folder.join("calm");
         let status = self.command(&calm, 2).stderr(Stdio::null()).status();
         assert!(status.expect("plyflow starts").success());
+        let expected = artifacts(&calm);
         let kept = std::fs::read(self.folder.join("count.json")).unwrap_or_default();
+        let kept: Kept = serde_json::from_slice(&kept).unwrap_or_default();
+        // With other plugins every step has another key, and what they make would all count as partial.
+        assert!(
+            kept.count.runs == 0 || kept.artifacts.iter().eq(expected.keys()),
+            "{} was begun with other plugins or another workflow: empty it, or take another folder",
+            self.folder.display()
+        );
         let mut campaign = Campaign {
             plan: self,
-            expected: artifacts(&calm),
-            count: serde_json::from_slice(&kept).unwrap_or_default(),
+            expected,
+            count: kept.count,
             watch: Watch::begin(&self.store()),
-            said: Vec::new(),
+            said: kept.said,
         };
         while campaign.count.kills < self.kills {
             campaign.run();
@@ -106,7 +124,12 @@ impl Plan {
 
 impl Campaign<'_> {
     fn keep(&self) {
-        let text = serde_json::to_vec(&self.count).expect("numbers");
+        let kept = Kept {
+            count: self.count.clone(),
+            said: self.said.clone(),
+            artifacts: self.expected.keys().cloned().collect(),
+        };
+        let text = serde_json::to_vec(&kept).expect("numbers");
         let new = self.plan.folder.join("count.new");
         std::fs::write(&new, text).expect("room for a count");
         std::fs::rename(new, self.plan.folder.join("count.json")).expect("a count");
