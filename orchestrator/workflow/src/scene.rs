@@ -195,7 +195,7 @@ pub fn scene_value(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> 
     for (i, material) in materials.into_iter().enumerate() {
         scene["sheets"][i]["material"] = material?;
     }
-    match serde_json::from_value::<Scene>(scene).and_then(|mut scene| {
+    match Scene::from_json(scene).and_then(|mut scene| {
         // Prose does not matter to any result.
         scene.description = None;
         for (path, asked) in given::asks(&scene) {

@@ -81,7 +81,7 @@ fn a_scene_has_its_materials_inside_and_reads_back_as_its_type() {
         "prose does not enter"
     );
     use plyflow_model::{friction::Coefficient, units::Number};
-    let typed: plyflow_model::scene::Scene = serde_json::from_value(scene.clone()).unwrap();
+    let typed = plyflow_model::scene::Scene::from_json(scene.clone()).unwrap();
     let constant = |n| Some(Coefficient::Constant(Number(n)));
     assert_eq!(typed.friction.tool_diaphragm, constant(0.51));
     assert_eq!(serde_json::to_value(&typed).unwrap(), *scene);
@@ -97,7 +97,7 @@ fn a_table_of_pressures_is_read_in_any_unit_and_reads_back_as_its_type() {
     );
     let w = (study.load()).unwrap_or_else(|e| panic!("{}", e.render(false)));
     let scene = &step(&w, "coarse").parameters["scene"];
-    let typed: plyflow_model::scene::Scene = serde_json::from_value(scene.clone()).unwrap();
+    let typed = plyflow_model::scene::Scene::from_json(scene.clone()).unwrap();
     assert_eq!(serde_json::to_value(&typed).unwrap(), *scene);
     use plyflow_model::scene::{PressureCourse, Process};
     let Process::DoubleDiaphragm(process) = &typed.process else {

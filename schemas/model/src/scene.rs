@@ -56,6 +56,26 @@ pub struct Scene {
     pub symmetry: Vec<MirrorPlane>,
 }
 
+impl Scene {
+    /// Of JSON. Reading a scene takes seconds to compile, and whoever reads one by this needs not compile it again.
+    ///
+    /// # Errors
+    /// What does not fit, and what was expected.
+    #[inline(never)]
+    pub fn from_json(value: serde_json::Value) -> Result<Self, serde_json::Error> {
+        serde_json::from_value(value)
+    }
+
+    /// The same for a field of what is read from something else (`deserialize_with`).
+    ///
+    /// # Errors
+    /// As [`Scene::from_json`].
+    pub fn of_json<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let value = serde_json::Value::deserialize(from)?;
+        Self::from_json(value).map_err(serde::de::Error::custom)
+    }
+}
+
 /// What may stand in a scene's list of sheets.
 // A `Scene` has only sheets: who resolves a scene puts the plies of a book in the place of the words that ask for them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -27,7 +27,7 @@ fn scene(tool: Value, ply: Value) -> Scene {
             "drawing_time": "0.1 s", "settling_time": "0.1 s", "film_joint_margin": "0.03 m",
         }},
     });
-    serde_json::from_value(scene).unwrap_or_else(|e| panic!("{e}"))
+    Scene::from_json(scene).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn square(half: f64) -> Vec<Point> {
@@ -105,7 +105,7 @@ fn all_that_a_scene_asks_for_is_listed_with_its_place_and_kept_by_its_words() {
     );
     let written = serde_json::to_value(&scene).unwrap();
     assert_eq!(written["sheets"][1]["outline"], json!({"input": "blank"}));
-    assert_eq!(serde_json::from_value::<Scene>(written).unwrap(), scene);
+    assert_eq!(Scene::from_json(written).unwrap(), scene);
     // What is filled in is no word of the tool.
     let mut filled = scene.clone();
     fill(&mut filled, &made()).unwrap();

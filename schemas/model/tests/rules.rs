@@ -63,7 +63,7 @@ fn press(change: impl FnOnce(&mut Value)) -> Value {
 }
 
 fn refused(scene: Value) -> Result<(), (Rule, String)> {
-    let scene: Scene = serde_json::from_value(scene).unwrap_or_else(|e| panic!("{e}"));
+    let scene = Scene::from_json(scene).unwrap_or_else(|e| panic!("{e}"));
     rules::check(&scene).map_err(|fault| (fault.rule, fault.to_string()))
 }
 

@@ -28,7 +28,7 @@ fn stamped(change: impl FnOnce(&mut Value)) -> Value {
 }
 
 fn read(scene: Value) -> Scene {
-    serde_json::from_value(scene).unwrap_or_else(|e| panic!("{e}"))
+    Scene::from_json(scene).unwrap_or_else(|e| panic!("{e}"))
 }
 
 #[test]
@@ -44,7 +44,7 @@ fn a_sound_stamping_keeps_every_rule_and_every_part_rubs_on_every_ply() {
 #[test]
 fn what_a_scene_writes_of_a_stamping_is_what_it_reads() {
     let scene = read(stamped(|_| {}));
-    let again: Scene = serde_json::from_value(serde_json::to_value(&scene).unwrap()).unwrap();
+    let again = Scene::from_json(serde_json::to_value(&scene).unwrap()).unwrap();
     assert_eq!(scene, again);
 }
 

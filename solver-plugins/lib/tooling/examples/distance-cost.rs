@@ -11,7 +11,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args()
         .nth(1)
         .ok_or("usage: distance-cost <scene.yaml>")?;
-    let scene: Scene = serde_saphyr::from_str(&std::fs::read_to_string(&path)?)?;
+    let scene = Scene::from_json(serde_saphyr::from_str(&std::fs::read_to_string(&path)?)?)?;
     let started = Instant::now();
     let mesh = plyflow_tooling::build_from(
         &scene.tool,

@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .ok_or("usage: field-error <scene.yaml> [offset] [spacing ...]")?;
     let numbers: Vec<f64> = arguments.map(|a| a.parse()).collect::<Result<_, _>>()?;
     let offset = 1e-3 * numbers.first().copied().unwrap_or(1.0);
-    let scene: Scene = serde_saphyr::from_str(&std::fs::read_to_string(&path)?)?;
+    let scene = Scene::from_json(serde_saphyr::from_str(&std::fs::read_to_string(&path)?)?)?;
     let folder = Path::new(&path).parent().unwrap_or(Path::new(""));
     let mesh = plyflow_tooling::build_from(&scene.tool, folder)?;
     println!("{} facets", mesh.triangles.len());

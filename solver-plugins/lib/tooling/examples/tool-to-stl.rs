@@ -10,7 +10,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let scene_path = arguments.next().ok_or(usage)?;
     let stl_path = arguments.next().ok_or(usage)?;
-    let scene: Scene = serde_saphyr::from_str(&std::fs::read_to_string(&scene_path)?)?;
+    let scene = Scene::from_json(serde_saphyr::from_str(&std::fs::read_to_string(
+        &scene_path,
+    )?)?)?;
     let folder = Path::new(&scene_path).parent().unwrap_or(Path::new(""));
     let mesh = plyflow_tooling::build_from(&scene.tool, folder)?;
     let facets: Vec<[[f64; 3]; 3]> = (0..mesh.triangles.len())

@@ -148,7 +148,7 @@ mod tests {
             "friction": {"tool_fabric": 0.2},
             "process": {"stamping": {"forming_time": "100 ms", "settling_time": "10 ms", "parts": [part]}}
         });
-        serde_json::from_value(scene).unwrap_or_else(|e| panic!("{e}"))
+        Scene::from_json(scene).unwrap_or_else(|e| panic!("{e}"))
     }
 
     fn made(part: Value) -> Result<PartTool, String> {

@@ -63,7 +63,7 @@ fn scene(tool: Value) -> Scene {
             "bagging_time": "0.1 s", "lowering_time": "0.1 s", "drawing_time": "0.1 s", "settling_time": "0.1 s", "film_joint_margin": "30 mm",
         }},
     });
-    serde_json::from_value(scene).unwrap_or_else(|e| panic!("{e}"))
+    Scene::from_json(scene).unwrap_or_else(|e| panic!("{e}"))
 }
 
 const SPACING: f64 = 3e-3;

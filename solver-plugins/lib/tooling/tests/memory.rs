@@ -46,7 +46,7 @@ static ALLOCATOR: Counting = Counting;
 fn a_field_that_refines_itself_takes_less_than_60_megabytes_for_the_joggle_spar() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../workflows/joggle-spar");
     let text = std::fs::read_to_string(folder.join("scene.yaml")).unwrap();
-    let scene: Scene = serde_saphyr::from_str(&text).unwrap();
+    let scene = Scene::from_json(serde_saphyr::from_str(&text).unwrap()).unwrap();
     let mesh = plyflow_tooling::build_from(&scene.tool, &folder).unwrap();
     let before = HELD.load(Relaxed);
     MOST.store(before, Relaxed);

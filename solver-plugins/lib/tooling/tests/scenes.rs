@@ -14,6 +14,10 @@ fn parse<T: serde::de::DeserializeOwned>(path: &Path) -> T {
     serde_saphyr::from_str(&text).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
+fn scene(path: &Path) -> Scene {
+    Scene::from_json(parse(path)).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
 fn scenes() -> Vec<(PathBuf, Scene)> {
     let mut folders: Vec<PathBuf> = std::fs::read_dir(workflows())
         .unwrap()
@@ -25,7 +29,7 @@ fn scenes() -> Vec<(PathBuf, Scene)> {
         .map(|f| f.join("scene.yaml"))
         .filter(|f| f.is_file())
         .collect();
-    files.into_iter().map(|f| (f.clone(), parse(&f))).collect()
+    files.into_iter().map(|f| (f.clone(), scene(&f))).collect()
 }
 
 #[test]
@@ -86,7 +90,7 @@ fn preform_of_the_joggle_spar_ends_above_the_bed() {
     // Thesis 5.3.1: the depth of the preform is less than that of the tool. Arc length along the section
     // where the tool is lowest, from the blank's edge to the bed.
     let path = workflows().join("joggle-spar/scene.yaml");
-    let scene: Scene = parse(&path);
+    let scene = scene(&path);
     let mesh = plyflow_tooling::build(&scene.tool).unwrap();
     let x = -0.2003;
     let mut arc = 0.0;

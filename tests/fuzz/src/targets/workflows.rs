@@ -78,10 +78,10 @@ fn in_a_workflow(folder: &Folder) {
         return;
     };
     let given = &found.steps[0].parameters["scene"];
-    let typed = || serde_json::from_value::<Scene>(given.clone());
+    let typed = || Scene::from_json(given.clone());
     let scene = typed().unwrap_or_else(|e| panic!("plan passes what a plugin refuses: {e}"));
     let written = serde_json::to_value(&scene).expect("a scene is JSON");
-    let again: Scene = serde_json::from_value(written).expect("a scene that was written");
+    let again = Scene::from_json(written).expect("a scene that was written");
     assert_eq!(again, scene, "written and read as another scene");
 }
 

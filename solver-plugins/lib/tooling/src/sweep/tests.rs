@@ -18,7 +18,7 @@ pub(crate) fn demo() -> JoggleSpar {
         "/../../../workflows/joggle-spar/scene.yaml"
     );
     let text = std::fs::read_to_string(path).unwrap();
-    let scene: Scene = serde_saphyr::from_str(&text).unwrap();
+    let scene = Scene::from_json(serde_saphyr::from_str(&text).unwrap()).unwrap();
     match scene.tool {
         Tool::JoggleSpar(spar) => spar,
         other => panic!("not a joggle spar: {other:?}"),

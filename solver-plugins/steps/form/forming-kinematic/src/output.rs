@@ -19,6 +19,7 @@ use std::time::Instant;
 /// Parameters of the step, SI.
 #[derive(Debug, Clone, Deserialize)]
 struct Parameters {
+    #[serde(deserialize_with = "Scene::of_json")]
     scene: Scene,
     element_size: f64,
     net_spacing: Option<f64>,

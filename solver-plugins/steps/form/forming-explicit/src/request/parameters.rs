@@ -20,6 +20,7 @@ pub struct ComponentChoice {
 #[derive(Debug, Clone, Deserialize)]
 pub struct Parameters {
     /// The scene.
+    #[serde(deserialize_with = "Scene::of_json")]
     pub scene: Scene,
     /// Element of the plies.
     pub element: ComponentChoice,

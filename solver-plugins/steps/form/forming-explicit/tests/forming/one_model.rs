@@ -6,6 +6,7 @@ use plyflow_geometry::vec3::Vec3;
 use plyflow_kernels::rf4::Rf4;
 use plyflow_mechanics::component::element_fields;
 use plyflow_mechanics::energy::Ledger;
+use plyflow_model::scene::Scene;
 use plyflow_sdk::{Element, StepError};
 use serde_json::{Value, json};
 
@@ -156,7 +157,7 @@ fn symmetric(zones: &[[f64; 4]], planes: &[&str]) -> Parameters {
         let shear = json!({"coefficients": [0.0, 112.0, 0.0, 137.0], "limit": 1.05});
         with.insert("shear".into(), shear);
     }
-    p.scene = serde_json::from_value(scene).unwrap();
+    p.scene = Scene::from_json(scene).unwrap();
     p
 }
 

@@ -3,6 +3,7 @@
 use crate::common::scenes::press;
 use crate::common::{BuiltIn, form};
 use plyflow_forming_explicit::{Forming, Outcome, Parameters, build_global};
+use plyflow_model::scene::Scene;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -300,7 +301,7 @@ fn what_makes_no_press_is_refused_with_what_to_do() {
         let press = &mut scene["process"]["press"];
         *press.pointer_mut(key).unwrap() = value;
         let mut p = parameters(1, &Value::Null);
-        p.scene = serde_json::from_value(scene).unwrap();
+        p.scene = Scene::from_json(scene).unwrap();
         refused(&p)
     };
     let deep = text("/stroke", json!("0.03 m"));
@@ -319,7 +320,7 @@ fn what_makes_no_press_is_refused_with_what_to_do() {
     scene["process"]["press"]["die"] =
         json!({"opening_radius": "0.006 m", "edge_radius": "0.005 m"});
     let mut p = parameters(1, &Value::Null);
-    p.scene = serde_json::from_value(scene).unwrap();
+    p.scene = Scene::from_json(scene).unwrap();
     let wide = refused(&p);
     assert!(wide.contains("the punch reaches into the die"), "{wide}");
     // A strip with no node inside has nothing about which rf4 bends.
@@ -327,7 +328,7 @@ fn what_makes_no_press_is_refused_with_what_to_do() {
     scene["sheets"][0]["width"] = json!("0.004 m");
     scene["sheets"][0]["material"]["with"]["bending"] = json!({"positive": {"stiffness": 0.001}});
     let mut p = parameters(1, &Value::Null);
-    p.scene = serde_json::from_value(scene).unwrap();
+    p.scene = Scene::from_json(scene).unwrap();
     p.element.plugin = "rf4".into();
     p.element_size = 0.004;
     let strip = refused(&p);

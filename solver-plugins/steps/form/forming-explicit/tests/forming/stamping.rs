@@ -4,6 +4,7 @@ use crate::common::scenes::{hourglass, ply};
 use crate::common::{BuiltIn, Silent, form, woven};
 use plyflow_forming_explicit::{Forming, Parameters, RigidName, Watch, Watched, build_global};
 use plyflow_mechanics::archive::Archive;
+use plyflow_model::scene::Scene;
 use serde_json::{Value, json};
 
 /// A block with its flat top at 10 mm, under a ply of 0.3 mm; `stamping` says what else there is, and `change` has the last word.
@@ -222,7 +223,7 @@ fn a_part_that_never_touches_is_told_and_those_that_do_are_not() {
         .as_array_mut()
         .unwrap()
         .push(deep);
-    parts.scene = serde_json::from_value(scene).unwrap();
+    parts.scene = Scene::from_json(scene).unwrap();
     let (forming, _) = form(&parts, 1);
     let told = forming.load.stamping().unwrap().never_touched();
     assert!(

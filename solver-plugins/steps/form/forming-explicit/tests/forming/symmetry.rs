@@ -8,6 +8,7 @@ use plyflow_kernels::{m4::M4, rf4::Rf4, s4::S4};
 use plyflow_mechanics::component::{ElementField, element_fields};
 use plyflow_mechanics::energy::Ledger;
 use plyflow_mechanics::mesh::area_vector;
+use plyflow_model::scene::Scene;
 use plyflow_sdk::{Element, StepError};
 use serde_json::{Value, json};
 
@@ -30,7 +31,7 @@ fn diaphragms(element: &str, symmetry: &[&str]) -> Parameters {
         "bag_pressure": "100000 Pa", "forming_pressure": "100000 Pa",
         "bagging_time": "0.04 s", "lowering_time": "0.06 s", "drawing_time": "0.06 s",
         "settling_time": "0.005 s", "film_pre_stretch": 0.01, "film_joint_margin": "0.03 m"}});
-    p.scene = serde_json::from_value(scene).unwrap();
+    p.scene = Scene::from_json(scene).unwrap();
     p.diaphragm_element.with = json!({"hourglass_floor": 3000.0});
     (p.element_size, p.time_step, p.tool_grid) = (0.0075, 1.2e-5, 0.002);
     p.diaphragm_element_size = Some(0.015);
@@ -265,7 +266,7 @@ fn refused(p: &Parameters, change: impl Fn(&mut Value)) -> String {
     let mut p = p.clone();
     let mut scene = serde_json::to_value(&p.scene).unwrap();
     change(&mut scene);
-    p.scene = serde_json::from_value(scene).unwrap();
+    p.scene = Scene::from_json(scene).unwrap();
     build_global(&p, &BuiltIn)
         .err()
         .expect("refused")
@@ -305,7 +306,7 @@ fn what_is_not_its_own_mirror_image_is_refused_with_what_and_where() {
     let mut half = diaphragms("m4", &["y"]);
     let mut scene = serde_json::to_value(&half.scene).unwrap();
     scene["tool"] = spar;
-    half.scene = serde_json::from_value(scene).unwrap();
+    half.scene = Scene::from_json(scene).unwrap();
     assert!(build_global(&half, &BuiltIn).is_ok());
 }
 
@@ -333,7 +334,7 @@ fn materials_that_a_plane_turns_into_others_are_refused() {
     let mut alike = p.clone();
     let mut scene = serde_json::to_value(&alike.scene).unwrap();
     scene["sheets"][0]["material"] = bending("same");
-    alike.scene = serde_json::from_value(scene).unwrap();
+    alike.scene = Scene::from_json(scene).unwrap();
     assert!(build_global(&alike, &BuiltIn).is_ok());
     let text = refused(&p, |s| s["sheets"][0]["material"] = bending("opposite"));
     for part in ["bending moment differs", "two fibre families differ"] {
@@ -343,7 +344,7 @@ fn materials_that_a_plane_turns_into_others_are_refused() {
     let mut membrane = press("m4", DIAGONAL, &["x"]);
     let mut scene = serde_json::to_value(&membrane.scene).unwrap();
     scene["sheets"][0]["material"] = bending("opposite");
-    membrane.scene = serde_json::from_value(scene).unwrap();
+    membrane.scene = Scene::from_json(scene).unwrap();
     let made = build_global(&membrane, &BuiltIn);
     assert!(
         made.is_ok(),
@@ -364,6 +365,6 @@ fn friction_by_the_angle_to_one_of_two_exchanged_families_is_refused() {
     let mut along = press("m4", 0.0, &["y"]);
     let mut scene = serde_json::to_value(&along.scene).unwrap();
     scene["friction"]["pairs"] = law;
-    along.scene = serde_json::from_value(scene).unwrap();
+    along.scene = Scene::from_json(scene).unwrap();
     assert!(build_global(&along, &BuiltIn).is_ok());
 }

@@ -11,6 +11,7 @@ use plyflow_forming_explicit::{Forming, Outcome, Parameters};
 use plyflow_geometry::vec3::Vec3;
 use plyflow_kernels::m4::M4;
 use plyflow_mechanics::component::element_fields;
+use plyflow_model::scene::Scene;
 use plyflow_sdk::Element as _;
 use plyflow_tooling::ToolMesh;
 use serde_json::{Value, json};
@@ -46,7 +47,7 @@ fn pressed(tool: &Value, size: f64, opening: f64, symmetry: &[&str]) -> Paramete
     scene["sheets"][0]["length"] = json!(format!("{size} m"));
     scene["sheets"][0]["width"] = json!(format!("{size} m"));
     scene["process"]["press"]["die"]["opening_radius"] = json!(format!("{opening} m"));
-    p.scene = serde_json::from_value(scene).unwrap();
+    p.scene = Scene::from_json(scene).unwrap();
     (p.element_size, p.tool_grid) = (0.008, 0.001);
     p
 }
