@@ -118,7 +118,7 @@ fn under_one_film_no_more_is_drawn_than_there_is_and_its_frame_ends_on_the_bed_o
         (
             "frame_width",
             json!("90 mm"),
-            "more than the 100 mm that ply `a` takes",
+            "more than the 100 mm that ply `b` takes",
         ),
         (
             "forming_pressure",
