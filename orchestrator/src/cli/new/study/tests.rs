@@ -117,6 +117,7 @@ fn under_a_single_film_plies_lie_on_the_tool() {
             "{name: film, kind: diaphragm, material: materials/stretchlon-ht350.yaml}",
             "tool_fabric: 0.23",
             "stretching_time: 40 ms",
+            "weight: tool",
         ] {
             assert!(scene.contains(says), "{says}\n{scene}");
         }

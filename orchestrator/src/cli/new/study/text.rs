@@ -234,7 +234,10 @@ impl Study {
             "    {first}\n    lowering_time: {}\n    drawing_time: {}\n    settling_time: 40 ms\n    film_pre_stretch: 0.01\n",
             lowering.value, drawing.value,
         );
-        if !single {
+        if single {
+            text += &comment(4, "What holds the plies on the tool before the film does.");
+            text += "    weight: tool\n";
+        } else {
             let margin = mm((4.0 * elements.whole).max(0.03));
             let _ = writeln!(text, "    film_joint_margin: {margin}");
         }

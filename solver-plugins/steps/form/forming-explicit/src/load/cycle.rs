@@ -281,4 +281,25 @@ mod tests {
             assert!((w - wanted).abs() < 1e-9, "{t} s: {w} Pa");
         }
     }
+
+    #[test]
+    fn a_single_film_is_stretched_and_then_drawn_from_the_pressure_around_it() {
+        let process = json!({
+            "frame_length": "1 m", "frame_width": "1 m", "clearance": "0.01 m", "forming_pressure": "60000 Pa", "surroundings": "80000 Pa",
+            "stretching_time": "0.2 s", "lowering_time": "0.3 s", "drawing_time": "0.4 s", "settling_time": "0.1 s",
+            "film_pre_stretch": 0.02, "weight": "tool"});
+        let cycle = Cycle::of_single(&serde_json::from_value(process).unwrap(), [0.1, 0.0]);
+        let names = [0.1, 0.3, 0.6, 0.95].map(|t| cycle.phase(t));
+        assert_eq!(names, ["stretching", "lowering", "drawing", "settling"]);
+        assert_eq!((cycle.bag, cycle.cavity_end), (8e4, 2e4));
+        assert_eq!(
+            (cycle.stretch(0.2), cycle.fall(0.2)),
+            (0.02, -STANDARD_GRAVITY)
+        );
+        assert_eq!(
+            (cycle.frame_height(0.2), cycle.frame_height(0.5)),
+            (0.1, 0.0)
+        );
+        assert!((cycle.wanted_in_cavity(1.0).unwrap() - 2e4).abs() < 1e-9);
+    }
 }
