@@ -62,6 +62,31 @@ fn plies_materials_friction_process_and_tool_are_told_as_the_run_had_them() {
 }
 
 #[test]
+fn a_single_film_is_told_with_its_frame_and_absolute_pressures() {
+    let (_keep, folder) = folder();
+    let mut study = Study::new(&folder);
+    study.scene["process"] = json!({"single_diaphragm": {
+        "frame_length": "0.29 m", "frame_width": "0.21 m", "clearance": "0.005 m", "forming_pressure": "90000 Pa", "surroundings": "100000 Pa",
+        "stretching_time": "0.08 s", "lowering_time": "0.3 s", "drawing_time": "0.4 s", "settling_time": "0.04 s", "film_pre_stretch": 0.01,
+        "bed": false, "frame_height": "0.01 m", "weight": "tool"}});
+    study.forming("coarse", None, 0.008);
+    let told = inputs(&study.input(), &folder).unwrap();
+    for text in [
+        "single-diaphragm forming",
+        ">stretching</text>",
+        "pressure under the film (kPa)",
+        "Pressures are absolute.",
+        "forming pressure 90 kPa",
+        "surroundings at 100 kPa",
+        "no bed, the frame ends at z = 10 mm",
+        "weight towards the tool",
+    ] {
+        assert!(told.contains(text), "{text} is not in {told}");
+    }
+    assert!(!told.contains("bag pressure"), "{told}");
+}
+
+#[test]
 fn an_artifact_that_tells_no_scene_has_its_stack_and_its_tool_alone() {
     let (_keep, folder) = folder();
     let mut study = Study::new(&folder);

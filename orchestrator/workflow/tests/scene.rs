@@ -6,6 +6,10 @@ use common::{Study, WORKFLOW};
 
 const S: &str = "scene.yaml";
 
+/// A process with one film.
+const SINGLE: &str = "process:\n  single_diaphragm:\n    frame_length: 1.8 m\n    frame_width: 1.5 m\n    clearance: 5 mm\n    forming_pressure: 1 bar\n\
+    \x20   stretching_time: 5 ms\n    lowering_time: 20 ms\n    drawing_time: 20 ms\n    settling_time: 5 ms\n";
+
 /// The scene with other sheets and another process.
 fn scene(sheets: &[(&str, &str)], friction: &str, process: &str) -> String {
     let sheet = |(name, kind): &(&str, &str)| match *kind {
@@ -22,6 +26,7 @@ fn scene(sheets: &[(&str, &str)], friction: &str, process: &str) -> String {
         "press" => {
             "process:\n  press:\n    stroke: 50 mm\n    forming_time: 1 s\n    settling_time: 0 s\n    die: {opening_radius: 20 mm, edge_radius: 6 mm}\n".to_owned()
         }
+        "single_diaphragm" => SINGLE.to_owned(),
         _ => common::SCENE[common::SCENE.find("process:").unwrap()..].to_owned(),
     };
     let sheets: String = sheets.iter().map(sheet).collect();
@@ -78,6 +83,24 @@ fn the_stack_is_in_the_order_of_its_process() {
             &[film, ply, ply],
             Some((2, "a diaphragm above it")),
         ),
+        ("single_diaphragm", &[ply, film], None),
+        ("single_diaphragm", &[ply, ply, film], None),
+        (
+            "single_diaphragm",
+            &[film, ply, film],
+            Some((0, "no diaphragm here: one or more plies, one diaphragm")),
+        ),
+        (
+            "single_diaphragm",
+            &[ply, film, ply, film],
+            Some((1, "no diaphragm here")),
+        ),
+        (
+            "single_diaphragm",
+            &[ply, ply],
+            Some((1, "a diaphragm above it")),
+        ),
+        ("single_diaphragm", &[film], Some((0, "plies below it"))),
         ("press", &[ply], None),
         ("press", &[ply, ply], None),
         ("press", &[ply, film], Some((1, "plies alone"))),
@@ -110,6 +133,7 @@ fn pairs_of_friction_are_those_of_the_process() {
     let of = |process: &str, pairs: &str| {
         let sheets: &[(&str, &str)] = match process {
             "press" => &[("a", "ply"), ("b", "ply")],
+            "single_diaphragm" => &[("a", "ply"), ("b", "ply"), ("high", "diaphragm")],
             _ => &[("low", "diaphragm"), ("a", "ply"), ("high", "diaphragm")],
         };
         let pairs: String = pairs
@@ -128,6 +152,8 @@ fn pairs_of_friction_are_those_of_the_process() {
         ""
     );
     assert_eq!(of("press", "tool+a tool+b die+b die+a a+b"), "");
+    let all = "tool+a tool+b tool+high bed+a bed+b bed+high a+b high+b high+a";
+    assert_eq!(of("single_diaphragm", all), "");
     // Plies slide: what is further apart in the stack meets past the edges of the others, as the solver has it.
     let sheets = [
         ("low", "diaphragm"),
@@ -333,4 +359,52 @@ fn a_slip_in_one_part_hides_nothing_in_another() {
         !found.contains("needs `fibre_2`") && !found.contains("is missing"),
         "{found}"
     );
+}
+
+#[test]
+fn what_does_not_fit_a_single_film_is_told_at_its_place() {
+    let sheets = [("a", "ply"), ("high", "diaphragm")];
+    let sound = scene(&sheets, "", "single_diaphragm");
+    assert_eq!(told(&sound), "");
+    let after = |line: &str| {
+        let settled = "    settling_time: 5 ms\n";
+        sound.replace(settled, &format!("{settled}{line}\n"))
+    };
+    let last = sound.lines().count() + 1;
+    for (line, says) in [
+        (
+            "    frame_height: 3 mm",
+            "no `frame_height` where there is a bed",
+        ),
+        ("    weight: away", "pulls the plies off the tool"),
+        ("    surroundings: 0 bar", "more than 0 Pa"),
+        ("    bag_pressure: 1 bar", "unknown key `bag_pressure`"),
+        (
+            "    surroundings: 0.9 bar",
+            "at most `surroundings` (0.9 bar",
+        ),
+    ] {
+        let found = told(&after(line));
+        // What is drawn is wrong where it stands itself.
+        let at = match line {
+            "    surroundings: 0.9 bar" => last - 5,
+            _ => last,
+        };
+        assert!(
+            found.contains(&format!("scene.yaml:{at}:")) && found.contains(says),
+            "{line}: {found}"
+        );
+    }
+    let drawn = told(&sound.replace("forming_pressure: 1 bar", "forming_pressure: 1.2 bar"));
+    assert!(drawn.contains("at most `surroundings` (1 bar)"), "{drawn}");
+    let hung = "    bed: false\n    frame_height: 3 mm\n    weight: tool";
+    assert_eq!(told(&after(hung)), "");
+    // Plies lie on the tool itself.
+    let bare = told(&sound.replace("  tool_fabric: 0.2\n", ""));
+    assert!(
+        bare.contains("`tool_fabric` is missing") && bare.contains("`tool` and `a` touch"),
+        "{bare}"
+    );
+    let two = told(&sound.replace("  diaphragm_diaphragm: 0.5\n", ""));
+    assert_eq!(two, "");
 }

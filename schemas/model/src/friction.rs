@@ -12,7 +12,7 @@ pub struct Friction {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0, "maximum" = 2))]
     pub tool_diaphragm: Option<Coefficient>,
-    /// Tool (punch, die and blank holder) against fabric; needed in a press.
+    /// Tool (also bed, punch, die and blank holder) against fabric; needed in a press, in a stamping and under a single diaphragm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0, "maximum" = 2))]
     pub tool_fabric: Option<Coefficient>,
@@ -24,7 +24,7 @@ pub struct Friction {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0, "maximum" = 2))]
     pub fabric_fabric: Option<Coefficient>,
-    /// Diaphragm against diaphragm; needed where the stack has diaphragms.
+    /// Diaphragm against diaphragm; needed where the stack has two diaphragms.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0, "maximum" = 2))]
     pub diaphragm_diaphragm: Option<Coefficient>,

@@ -1,4 +1,4 @@
-//! The forming process of a scene: double-diaphragm forming, a press, or stamping between any rigid parts.
+//! The forming process of a scene: forming under one film or between two, a press, or stamping between any rigid parts.
 
 use crate::stamping::Stamping;
 use crate::units::{Force, Length, Number, Pressure, Time};
@@ -11,6 +11,8 @@ use serde::{Deserialize, Serialize};
 pub enum Process {
     /// Double-diaphragm forming.
     DoubleDiaphragm(DoubleDiaphragm),
+    /// Single-diaphragm forming: one film over plies that lie on the tool.
+    SingleDiaphragm(SingleDiaphragm),
     /// Press forming: punch, die and blank holder.
     Press(Press),
     /// Stamping between any rigid parts.
@@ -22,19 +24,34 @@ impl Process {
     pub fn clearance(&self) -> f64 {
         match self {
             Self::DoubleDiaphragm(p) => p.clearance.si(),
-            Self::Press(_) | Self::Stamping(_) => 0.0,
+            // The plies lie on the tool; the clearance is that of the film over them.
+            Self::SingleDiaphragm(_) | Self::Press(_) | Self::Stamping(_) => 0.0,
         }
     }
 
     /// Whether there is no machine bed under the tool: what hangs beside it hangs in the air.
     pub fn is_without_bed(&self) -> bool {
-        !matches!(self, Self::DoubleDiaphragm(_))
+        match self {
+            Self::DoubleDiaphragm(_) => false,
+            Self::SingleDiaphragm(p) => !p.bed,
+            Self::Press(_) | Self::Stamping(_) => true,
+        }
+    }
+
+    /// Length and width (m) of the opening of the frame that clamps films, of a process that has one.
+    pub fn frame(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::DoubleDiaphragm(p) => Some([p.frame_length.si(), p.frame_width.si()]),
+            Self::SingleDiaphragm(p) => Some([p.frame_length.si(), p.frame_width.si()]),
+            Self::Press(_) | Self::Stamping(_) => None,
+        }
     }
 
     /// The word for it in a scene file.
     pub fn word(&self) -> &'static str {
         match self {
             Self::DoubleDiaphragm(_) => "double_diaphragm",
+            Self::SingleDiaphragm(_) => "single_diaphragm",
             Self::Press(_) => "press",
             Self::Stamping(_) => "stamping",
         }
@@ -172,6 +189,65 @@ pub struct DoubleDiaphragm {
     pub weight: Option<WeightDirection>,
 }
 
+/// Single-diaphragm forming: the plies lie on the tool, and one film above them is clamped in a frame. The frame comes down onto the bed
+/// around the tool, or, without a bed, onto the tool itself. Then the air under the film is drawn.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SingleDiaphragm {
+    /// Length of the frame's opening along x.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub frame_length: Length,
+    /// Width of the frame's opening along y.
+    #[schemars(extend("x-exclusive-minimum" = "0 mm"))]
+    pub frame_width: Length,
+    /// Height of the film over the plies at the start.
+    #[schemars(extend("x-minimum" = "0 mm"))]
+    pub clearance: Length,
+    /// Pressure drawn under the film. A single value is that at the end, reached smoothly; a table tells its course over drawing.
+    #[schemars(extend("x-minimum" = "0 Pa"))]
+    pub forming_pressure: PressureCourse,
+    /// Pressure of the surroundings on the film, and under it before air is drawn.
+    #[serde(default = "SingleDiaphragm::default_surroundings")]
+    #[schemars(extend("x-exclusive-minimum" = "0 Pa"))]
+    pub surroundings: Pressure,
+    /// Simulated duration in which the frame stretches the film, and the weight comes.
+    #[schemars(extend("x-exclusive-minimum" = "0 s"))]
+    pub stretching_time: Time,
+    /// Simulated duration of lowering the frame.
+    #[schemars(extend("x-exclusive-minimum" = "0 s"))]
+    pub lowering_time: Time,
+    /// Simulated duration of drawing the air.
+    #[schemars(extend("x-exclusive-minimum" = "0 s"))]
+    pub drawing_time: Time,
+    /// Simulated duration at full pressure, for the motion to die out.
+    #[schemars(extend("x-minimum" = "0 s"))]
+    pub settling_time: Time,
+    /// Strain by which the frame stretches the film before it is lowered.
+    #[serde(default)]
+    #[schemars(extend("minimum" = 0, "maximum" = 0.2))]
+    pub film_pre_stretch: Number,
+    /// Whether there is a bed around the tool, the plane z = 0, onto which the frame comes down. Without one the film hangs between frame and tool.
+    #[serde(default = "SingleDiaphragm::with_bed")]
+    pub bed: bool,
+    /// Without a bed: height over z = 0 of the face on which the frame ends; 0 mm unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("x-minimum" = "0 mm"))]
+    pub frame_height: Option<Length>,
+    /// Where the weight of plies and film pulls them, which can only be onto the tool; left out: they have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weight: Option<WeightDirection>,
+}
+
+impl SingleDiaphragm {
+    fn default_surroundings() -> Pressure {
+        Pressure(1e5)
+    }
+
+    fn with_bed() -> bool {
+        true
+    }
+}
+
 /// A pressure that comes in one phase of the process.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
@@ -213,7 +289,7 @@ pub struct PressureAt {
     pub pressure: Pressure,
 }
 
-/// A direction in double-diaphragm forming.
+/// A direction in forming under films.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WeightDirection {

@@ -17,7 +17,7 @@ pub use crate::book::PlyBook;
 pub use crate::contour::{Circle, Contour, Drawing, NamedContour};
 pub use crate::process::{
     DoubleDiaphragm, Hold, Holder, Press, PressPlate, PressureAt, PressureCourse, PressureTable,
-    Process, Towards, WeightDirection,
+    Process, SingleDiaphragm, Towards, WeightDirection,
 };
 pub use crate::stamping::{
     ForceCourse, Gripper, MatchingDie, PartMotion, Pressed, Side, Stamping, StampingPart, Vertical,

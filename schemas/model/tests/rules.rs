@@ -62,6 +62,17 @@ fn press(change: impl FnOnce(&mut Value)) -> Value {
     scene
 }
 
+/// Two plies under one film.
+fn single(change: impl FnOnce(&mut Value)) -> Value {
+    let process = json!({"single_diaphragm": {
+        "frame_length": "1 m", "frame_width": "1 m", "clearance": "10 mm", "forming_pressure": "0.9 bar",
+        "stretching_time": "0.2 s", "lowering_time": "0.3 s", "drawing_time": "0.4 s", "settling_time": "0.1 s"}});
+    let stack = [("a", "ply"), ("b", "ply"), ("high", "diaphragm")];
+    let mut scene = scene(&stack, process);
+    change(&mut scene["process"]["single_diaphragm"]);
+    scene
+}
+
 fn refused(scene: Value) -> Result<(), (Rule, String)> {
     let scene = Scene::from_json(scene).unwrap_or_else(|e| panic!("{e}"));
     rules::check(&scene).map_err(|fault| (fault.rule, fault.to_string()))
@@ -79,6 +90,65 @@ fn assert_refused(scene: Value, rule: Rule, says: &[&str]) {
 fn sound_scenes_keep_every_rule() {
     assert_eq!(refused(bag(|_| ())), Ok(()));
     assert_eq!(refused(press(|_| ())), Ok(()));
+    assert_eq!(refused(single(|_| ())), Ok(()));
+}
+
+#[test]
+fn under_one_film_no_more_is_drawn_than_there_is_and_its_frame_ends_on_the_bed_or_at_a_height() {
+    for (key, value, says) in [
+        ("forming_pressure", json!("0 bar"), "nothing is formed"),
+        (
+            "forming_pressure",
+            json!("1.1 bar"),
+            "at most `surroundings` (1 bar)",
+        ),
+        (
+            "surroundings",
+            json!("0.8 bar"),
+            "forming_pressure: given 0.9 bar; expected at most `surroundings` (0.8 bar",
+        ),
+        ("surroundings", json!("0 bar"), "surroundings: given 0 bar"),
+        ("clearance", json!("-1 mm"), "begins above the plies"),
+        (
+            "frame_height",
+            json!("5 mm"),
+            "`bed: false` takes the bed away",
+        ),
+        ("weight", json!("away"), "`tool`, or no `weight`"),
+        (
+            "frame_width",
+            json!("90 mm"),
+            "more than the 100 mm that ply `b` takes",
+        ),
+        (
+            "forming_pressure",
+            json!({"table": [{"share": 0, "pressure": "0 Pa"}, {"share": 0.8, "pressure": "1 bar"}]}),
+            "where drawing ends",
+        ),
+    ] {
+        let (_, text) = refused(single(|p| p[key] = value)).expect_err(says);
+        assert!(
+            text.contains(says) && text.contains("process.single_diaphragm."),
+            "{key}: {text}"
+        );
+    }
+    let hung = |height: &str| {
+        single(|p| {
+            p["bed"] = json!(false);
+            p["frame_height"] = json!(height);
+        })
+    };
+    assert_eq!(refused(hung("5 mm")), Ok(()));
+    assert_refused(
+        hung("-5 mm"),
+        Rule::Frame,
+        &["frame_height: given -5 mm", "0 mm or more"],
+    );
+    // In an autoclave.
+    assert_eq!(
+        refused(single(|p| p["surroundings"] = json!("7 bar"))),
+        Ok(())
+    );
 }
 
 #[test]

@@ -114,8 +114,17 @@ impl StudyWords {
 pub enum StudyProcess {
     /// Between two films under vacuum
     DoubleDiaphragm,
+    /// Under one film, which vacuum draws over tool and plies
+    SingleDiaphragm,
     /// With punch, die and blank holder
     Press,
+}
+
+impl StudyProcess {
+    /// Whether films form the plies.
+    pub fn has_films(self) -> bool {
+        self != Self::Press
+    }
 }
 
 /// What can be begun.

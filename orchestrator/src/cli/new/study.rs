@@ -67,7 +67,7 @@ pub fn files(
     let mut take = |name: &str| take_material(name, &materials, folder, &mut files);
     let given = of.material.as_deref().map(&mut take).transpose()?;
     let (plies, sheets) = plies(args, &of, (metres, &unit), folder, given.clone(), &mut take)?;
-    if of.process == StudyProcess::DoubleDiaphragm {
+    if of.process.has_films() {
         let film = text_of(&materials.join("stretchlon-ht350.yaml"))?;
         files.push((Utf8PathBuf::from(FILM), film));
     }
@@ -243,9 +243,9 @@ fn told(study: &Study, folder: &Utf8Path) -> String {
             study.part.words.join(", ")
         ),
     };
-    let whole = match study.process {
-        StudyProcess::DoubleDiaphragm => "coarse",
-        StudyProcess::Press => "formed",
+    let whole = match study.process.has_films() {
+        true => "coarse",
+        false => "formed",
     };
     let plies = match &study.plies {
         Plies::Book(book) => format!(

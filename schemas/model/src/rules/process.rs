@@ -2,7 +2,9 @@
 
 use crate::fault::{Fault, Path, Phrase, Rule, bar, mm};
 use crate::material::MaterialEntry;
-use crate::process::{DoubleDiaphragm, Hold, Press, PressureCourse, Process};
+use crate::process::{
+    DoubleDiaphragm, Hold, Press, PressureCourse, Process, SingleDiaphragm, WeightDirection,
+};
 use crate::rules::friction::row_count;
 use crate::rules::known::Known;
 use crate::rules::stamping;
@@ -21,8 +23,16 @@ pub fn stack(known: &Known<'_>) -> Option<Fault> {
         Process::Press(_) | Process::Stamping(_) => (
             films.iter().position(|f| *f)?,
             "plies alone".to_owned(),
-            "a press has no films: leave the diaphragms out, or form the stack by `double_diaphragm`",
+            "a press has no films: leave the diaphragms out, or form the stack by `double_diaphragm` or `single_diaphragm`",
         ),
+        Process::SingleDiaphragm(_) => {
+            let (at, here) = misplaced_under_one(&films)?;
+            (
+                at,
+                format!("{here}: one or more plies, one diaphragm"),
+                "the sheets stand from the tool upwards; plies between two films are formed by `double_diaphragm`, plies without films by `press`",
+            )
+        }
         Process::DoubleDiaphragm(_) => {
             let (at, here) = misplaced(&films)?;
             (
@@ -59,6 +69,18 @@ fn misplaced(films: &[bool]) -> Option<(usize, &'static str)> {
     }
 }
 
+/// The sheet that is not where it should be under one film, and what belongs there.
+fn misplaced_under_one(films: &[bool]) -> Option<(usize, &'static str)> {
+    let last = films.len() - 1;
+    if films == [true] {
+        Some((0, "plies below it"))
+    } else if let Some(k) = films[..last].iter().position(|f| *f) {
+        Some((k, "no diaphragm here"))
+    } else {
+        (!films[last]).then_some((last, "a diaphragm above it"))
+    }
+}
+
 /// "1 diaphragm, 2 plies, 1 diaphragm".
 fn runs(films: &[bool]) -> String {
     let word = |run: &[bool]| match (run[0], run.len()) {
@@ -75,13 +97,17 @@ fn runs(films: &[bool]) -> String {
 pub fn check(known: &Known<'_>) -> Vec<Fault> {
     let mut found = Vec::new();
     match known.process {
-        Some(Process::DoubleDiaphragm(p)) => {
+        Some(process @ Process::DoubleDiaphragm(p)) => {
             if p.clearance.si() < 0.0 {
                 let fault = Fault::given(Rule::Frame, at("clearance"), mm(p.clearance.si()));
                 found.push(fault.expected("0 mm or more: the stack begins above the tool"));
             }
             pressures(p, &mut found);
-            frame(known, p, &mut found);
+            frame(known, process, &mut found);
+        }
+        Some(process @ Process::SingleDiaphragm(p)) => {
+            single(p, &mut found);
+            frame(known, process, &mut found);
         }
         Some(Process::Press(press)) => {
             let stroke = press.stroke.si();
@@ -101,6 +127,71 @@ pub fn check(known: &Known<'_>) -> Vec<Fault> {
 
 fn at(name: &str) -> Path {
     Path::to("process").key("double_diaphragm").key(name)
+}
+
+fn at_single(name: &str) -> Path {
+    Path::to("process").key("single_diaphragm").key(name)
+}
+
+/// What is wrong with the process under one film, besides its frame.
+fn single(p: &SingleDiaphragm, found: &mut Vec<Fault>) {
+    if p.clearance.si() < 0.0 {
+        let fault = Fault::given(Rule::Frame, at_single("clearance"), mm(p.clearance.si()));
+        found.push(fault.expected("0 mm or more: the film begins above the plies"));
+    }
+    if let (true, Some(height)) = (p.bed, p.frame_height) {
+        let fault = Fault::given(Rule::Frame, at_single("frame_height"), mm(height.si()));
+        found.push(
+            fault
+                .expected("no `frame_height` where there is a bed, onto which the frame comes down")
+                .help("`bed: false` takes the bed away"),
+        );
+    }
+    if let Some(height) = p.frame_height.filter(|h| h.si() < 0.0) {
+        let fault = Fault::given(Rule::Frame, at_single("frame_height"), mm(height.si()));
+        found.push(fault.expected("0 mm or more: the tool stands on z = 0"));
+    }
+    if p.weight == Some(WeightDirection::Away) {
+        let text = "given `away`, which pulls the plies off the tool, where nothing holds them";
+        let fault = Fault::text(Rule::Pressure, at_single("weight"), text);
+        found.push(
+            fault.expected("`tool`, or no `weight`").help(
+                "a tool that hangs over the plies needs a film below them: `double_diaphragm`",
+            ),
+        );
+    }
+    drawn_from_surroundings(p, found);
+}
+
+/// Pressures under one film: a table runs over drawing, something presses, and no more is drawn than there is.
+fn drawn_from_surroundings(p: &SingleDiaphragm, found: &mut Vec<Fault>) {
+    let path = at_single("forming_pressure");
+    if let Some(fault) = table(&p.forming_pressure, &path, "drawing") {
+        found.push(fault);
+        return;
+    }
+    let around = p.surroundings.si();
+    let fault = |path, pressure| Fault::given(Rule::Pressure, path, bar(pressure));
+    if !(around > 0.0 && around.is_finite()) {
+        let fault = fault(at_single("surroundings"), around);
+        found.push(fault.expected("more than 0 Pa: without it nothing is formed"));
+        return;
+    }
+    let drawn = values(&p.forming_pressure, &path);
+    let (at, last) = drawn.last().cloned().unwrap_or((path, 0.0));
+    if !(last > 0.0 && last.is_finite()) {
+        let fault = fault(at, last);
+        found.push(fault.expected("more than 0 Pa at the end: without it nothing is formed"));
+    }
+    if let Some((at, pressure)) = drawn.into_iter().find(|d| d.1 > around * (1.0 + 1e-9)) {
+        let given = at_single("surroundings");
+        let expected = Phrase::with_value("at most `surroundings` (", (given, bar(around)), ")");
+        found.push(
+            fault(at, pressure)
+                .expected(expected)
+                .help("more than all air under the film there is not to be drawn; in an autoclave `surroundings` are more than 1 bar"),
+        );
+    }
 }
 
 /// Places and values (Pa) of a pressure: those of its table, or its own.
@@ -197,11 +288,12 @@ fn table(course: &PressureCourse, path: &Path, phase: &str) -> Option<Fault> {
 }
 
 /// The frame must be larger than every ply where it lies.
-fn frame(known: &Known<'_>, p: &DoubleDiaphragm, found: &mut Vec<Fault>) {
-    for (axis, name, opening) in [
-        (0, "frame_length", p.frame_length),
-        (1, "frame_width", p.frame_width),
-    ] {
+fn frame(known: &Known<'_>, process: &Process, found: &mut Vec<Fault>) {
+    let Some(openings) = process.frame() else {
+        return;
+    };
+    for (axis, name) in ["frame_length", "frame_width"].into_iter().enumerate() {
+        let opening = openings[axis];
         let needs = known
             .plies()
             .filter_map(|(_, s)| Some((s, 2.0 * reach(s, axis)?)));
@@ -209,8 +301,9 @@ fn frame(known: &Known<'_>, p: &DoubleDiaphragm, found: &mut Vec<Fault>) {
             continue;
         };
         // To rounding: a ply as large as the frame is refused by the run, with what it needs beside.
-        if opening.si() < needed * (1.0 - 1e-9) {
-            let fault = Fault::given(Rule::Frame, at(name), mm(opening.si()));
+        if opening < needed * (1.0 - 1e-9) {
+            let path = Path::to("process").key(process.word()).key(name);
+            let fault = Fault::given(Rule::Frame, path, mm(opening));
             let expected = format!("more than the {} that ply `{}` takes", mm(needed), ply.name);
             found.push(fault.expected(expected).help(
                 "the frame is centred over the tool; it holds the plies, and free film around plies and tool",

@@ -9,7 +9,7 @@ use crate::stamping::Side;
 pub enum Class {
     /// Tool or bed, and a film.
     ToolDiaphragm,
-    /// A part of a press, and a ply.
+    /// What is rigid, and a ply.
     ToolFabric,
     /// A ply and a film.
     FabricDiaphragm,
@@ -86,6 +86,10 @@ pub fn sides(process: &Process) -> Vec<(&str, Side)> {
     let (below, above) = (Side::Below, Side::Above);
     match process {
         Process::DoubleDiaphragm(_) => vec![("tool", below), ("bed", below)],
+        Process::SingleDiaphragm(p) => {
+            let bed = p.bed.then_some(("bed", below));
+            [("tool", below)].into_iter().chain(bed).collect()
+        }
         Process::Press(press) => {
             let holder = press.holder.as_ref().map(|_| ("holder", below));
             let parts = [("tool", below), ("die", above)];
@@ -99,9 +103,10 @@ pub fn sides(process: &Process) -> Vec<(&str, Side)> {
 pub fn contacts<'a>(sheets: &[&'a Sheet], process: &'a Process) -> Vec<Contact<'a>> {
     let last = sheets.len().saturating_sub(1);
     let bag = matches!(process, Process::DoubleDiaphragm(_));
+    let single = matches!(process, Process::SingleDiaphragm(_));
     let mut found = Vec::new();
     for (part, side) in sides(process) {
-        // In a press any ply may touch any part, past the edges of the others.
+        // In a press, and under a single film, any sheet may touch any part, past the edges of the others.
         for (k, sheet) in sheets
             .iter()
             .enumerate()
@@ -111,12 +116,14 @@ pub fn contacts<'a>(sheets: &[&'a Sheet], process: &'a Process) -> Vec<Contact<'
             let over = side == Side::Above;
             found.push(Contact {
                 parts: if over { [name, part] } else { [part, name] },
-                class: if bag {
-                    Class::ToolDiaphragm
-                } else {
-                    Class::ToolFabric
+                class: match process {
+                    Process::DoubleDiaphragm(_) => Class::ToolDiaphragm,
+                    Process::SingleDiaphragm(_) => Class::of(sheet.kind, None),
+                    Process::Press(_) | Process::Stamping(_) => Class::ToolFabric,
                 },
-                next: k == if over { last } else { 0 },
+                // A film reaches beyond all plies.
+                next: k == if over { last } else { 0 }
+                    || (single && sheet.kind == SheetKind::Diaphragm),
             });
         }
     }
@@ -124,6 +131,10 @@ pub fn contacts<'a>(sheets: &[&'a Sheet], process: &'a Process) -> Vec<Contact<'
         // Plies slide, so that any two sheets may touch; beyond the plies the two films do.
         for (j, upper) in sheets.iter().enumerate().skip(k + 1) {
             let class = Class::of(lower.kind, Some(upper.kind));
+            // A second film is refused as such, and needs no coefficient.
+            if single && class == Class::DiaphragmDiaphragm {
+                continue;
+            }
             found.push(Contact {
                 parts: [&lower.name, &upper.name],
                 class,

@@ -4,7 +4,7 @@ use crate::checks::{checks, speck, thinnest_ply};
 use crate::mesh::ToolMesh;
 use crate::{input, stl};
 use plyflow_geometry::vec3::Vec3;
-use plyflow_model::scene::{Process, Scene, SheetKind, Tool};
+use plyflow_model::scene::{Scene, SheetKind, Tool};
 use plyflow_model::tool::place::{Auto, Axis, Centre, Direction, Foot, Place, Rotation};
 use plyflow_model::tool::placed::Placed;
 use plyflow_model::tool::stand::{Stand, stands};
@@ -85,7 +85,7 @@ impl Given<'_> {
                     if centre {
                         place.centre = Some(Centre::Auto(Auto::Auto));
                     }
-                    if matches!(self.scene.process, Process::DoubleDiaphragm(_)) || centre {
+                    if self.scene.process.frame().is_some() || centre {
                         place.foot = Some(Foot::Auto);
                     }
                     // Nothing of it is left where both are found.
@@ -143,8 +143,8 @@ impl Given<'_> {
         if speck(size, spacing) || size[2] < thinnest_ply(self.scene).min(1e-3) {
             return false;
         }
-        if let Process::DoubleDiaphragm(process) = &self.scene.process {
-            let frame = [process.frame_length.si(), process.frame_width.si()];
+        let process = &self.scene.process;
+        if let Some(frame) = process.frame().filter(|_| !process.is_without_bed()) {
             let inside = |k: usize| low[k] > -0.5 * frame[k] && high[k] < 0.5 * frame[k];
             if !(0..2).all(inside) {
                 return false;

@@ -7,7 +7,7 @@ use crate::tree::SurfaceTree;
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::{Vec3, dot, norm, scale, sub};
 use plyflow_model::material::MaterialEntry;
-use plyflow_model::scene::{Process, Scene, Sheet, SheetKind, Tool};
+use plyflow_model::scene::{Scene, Sheet, SheetKind, Tool};
 
 /// How far (m) a tool's lowest point may lie from the bed: what single precision leaves of a metre and more.
 const FOOT: f64 = 1e-5;
@@ -51,10 +51,12 @@ pub(crate) fn check_placed(scene: &Scene, mesh: &ToolMesh, spacing: f64) -> Resu
         return Err("scene.tool: it has no facet; expected a surface".into());
     }
     check_unit(scene, mesh, spacing)?;
-    if let Process::DoubleDiaphragm(process) = &scene.process {
+    if let Some(frame) = scene.process.frame() {
         check_foot(scene, mesh.bounds()[0][2])?;
-        let frame = [process.frame_length.si(), process.frame_width.si()];
-        check_frame(scene, mesh, frame)?;
+        // Without a bed the frame may end on the tool.
+        if !scene.process.is_without_bed() {
+            check_frame(scene, mesh, frame)?;
+        }
     }
     let shells = mesh.shells();
     check_bodies(scene, mesh, &shells)?;
@@ -177,13 +179,14 @@ fn check_frame(scene: &Scene, mesh: &ToolMesh, frame: [f64; 2]) -> Result<(), St
         return Ok(());
     }
     Err(format!(
-        "{} reaches from ({:.1}, {:.1}) to ({:.1}, {:.1}) mm, the frame (process.double_diaphragm) from ({:.1}, {:.1}) to ({:.1}, {:.1}) mm; \
+        "{} reaches from ({:.1}, {:.1}) to ({:.1}, {:.1}) mm, the frame (process.{}) from ({:.1}, {:.1}) to ({:.1}, {:.1}) mm; \
          the frame is too small for it: expected a tool inside of the frame, with its axis at x = y = 0{}",
         named(scene),
         1e3 * low[0],
         1e3 * low[1],
         1e3 * high[0],
         1e3 * high[1],
+        scene.process.word(),
         -500.0 * frame[0],
         -500.0 * frame[1],
         500.0 * frame[0],

@@ -86,7 +86,9 @@ pub fn rigid(scene: &Scene, spacing: f64) -> Result<RigidTool, String> {
     let (field, error) = field_of(scene, &mesh, spacing, &touched, |at| at)?;
     // Elsewhere is only what of a press's punch does not go through the blank.
     let elsewhere = match scene.process {
-        Process::DoubleDiaphragm(_) | Process::Stamping(_) => FieldError::default(),
+        Process::DoubleDiaphragm(_) | Process::SingleDiaphragm(_) | Process::Stamping(_) => {
+            FieldError::default()
+        }
         Process::Press(_) => field.error_against(&mesh, 0.0, |p| !touched(p)),
     };
     let mut warnings = Vec::new();
@@ -158,7 +160,9 @@ fn reach(spacing: f64, stack: f64) -> f64 {
 /// through the blank.
 fn touched(scene: &Scene, mesh: &ToolMesh) -> impl Fn(Vec3) -> bool + Sync + use<> {
     let from = match &scene.process {
-        Process::DoubleDiaphragm(_) | Process::Stamping(_) => f64::NEG_INFINITY,
+        Process::DoubleDiaphragm(_) | Process::SingleDiaphragm(_) | Process::Stamping(_) => {
+            f64::NEG_INFINITY
+        }
         Process::Press(press) => mesh.bounds()[1][2] - press.stroke.si() - stack(scene),
     };
     move |p: Vec3| p[2] >= from

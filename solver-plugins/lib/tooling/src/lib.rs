@@ -12,6 +12,7 @@ mod audit;
 mod build;
 mod checks;
 mod chord;
+mod column;
 mod double_dome;
 mod error;
 pub mod facets;

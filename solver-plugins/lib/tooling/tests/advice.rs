@@ -80,6 +80,27 @@ fn advised(said: &str) -> (String, Scene) {
 }
 
 #[test]
+fn a_frame_may_be_smaller_than_the_tool_where_there_is_no_bed_around_it() {
+    let tool = json!({"flat": {"length": "300 mm", "width": "120 mm", "height": "20 mm", "fillet": "5 mm", "facet_size": "10 mm"}});
+    let with = |bed: bool| {
+        let mut scene = serde_json::to_value(scene(tool.clone())).unwrap();
+        scene["sheets"].as_array_mut().unwrap().remove(0);
+        scene["process"] = json!({"single_diaphragm": {
+            "frame_length": "250 mm", "frame_width": "100 mm", "clearance": "5 mm", "forming_pressure": "1 bar", "stretching_time": "0.1 s",
+            "lowering_time": "0.1 s", "drawing_time": "0.1 s", "settling_time": "0.1 s", "bed": bed,
+        }});
+        let scene: Scene = serde_json::from_value(scene).unwrap();
+        checked(&scene, SPACING).map(|_| ())
+    };
+    let said = with(true).unwrap_err();
+    assert!(
+        said.contains("the frame (process.single_diaphragm)") && said.contains("too small"),
+        "{said}"
+    );
+    assert_eq!(with(false), Ok(()));
+}
+
+#[test]
 fn a_hat_that_lies_elsewhere_is_refused_with_words_that_put_it_right() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("my hat.stl");

@@ -5,7 +5,8 @@ use crate::read::History;
 use crate::units::{number, quantity};
 use maud::{Markup, html};
 use plyflow_model::scene::{
-    DoubleDiaphragm, Hold, Press, PressureCourse, Process, Towards, WeightDirection,
+    DoubleDiaphragm, Hold, Press, PressureCourse, Process, SingleDiaphragm, Towards,
+    WeightDirection,
 };
 use plyflow_model::stamping::{ForceCourse, PartMotion, Stamping, StampingPart, TOOL, Vertical};
 
@@ -28,18 +29,37 @@ struct Curve<'a> {
 pub(super) fn drawn(process: &Process, history: Option<&History>) -> Markup {
     let (phases, told) = match process {
         Process::DoubleDiaphragm(p) => (bag(p), bag_words(p)),
+        Process::SingleDiaphragm(p) => (single(p), single_words(p)),
         Process::Press(p) => (press(p), press_words(p)),
         Process::Stamping(p) => (stamping(p), stamping_words(p)),
     };
     let time = history.and_then(|h| h.get("time"));
     let curves = history.map(|h| curves(process, h)).unwrap_or_default();
     html! {
-        h4 { "Process: " @match process { Process::DoubleDiaphragm(_) => "double-diaphragm forming", Process::Press(_) => "press", Process::Stamping(_) => "stamping between rigid parts" } }
+        h4 { "Process: " (title(process)) }
         @match time {
             Some(time) if !curves.is_empty() => { (diagram(&phases, time, &curves)) }
             _ => { p class="note" { "Phases: " (phases.iter().map(|(name, t)| format!("{name} {}", quantity(*t * 1e3, "ms", 4))).collect::<Vec<_>>().join(", ")) ". This run has followed none of them: a drape is geometry alone." } }
         }
-        p class="note" { @if matches!(process, Process::DoubleDiaphragm(_)) && time.is_some() { "Pressures are over the vacuum between the films. " } (told.join("; ")) "." }
+        p class="note" { @if time.is_some() { (over(process)) } (told.join("; ")) "." }
+    }
+}
+
+fn title(process: &Process) -> &'static str {
+    match process {
+        Process::DoubleDiaphragm(_) => "double-diaphragm forming",
+        Process::SingleDiaphragm(_) => "single-diaphragm forming",
+        Process::Press(_) => "press",
+        Process::Stamping(_) => "stamping between rigid parts",
+    }
+}
+
+/// What the pressures of the diagram are counted from.
+fn over(process: &Process) -> &'static str {
+    match process {
+        Process::DoubleDiaphragm(_) => "Pressures are over the vacuum between the films. ",
+        Process::SingleDiaphragm(_) => "Pressures are absolute. ",
+        Process::Press(_) | Process::Stamping(_) => "",
     }
 }
 
@@ -47,6 +67,16 @@ pub(super) fn drawn(process: &Process, history: Option<&History>) -> Markup {
 fn bag(p: &DoubleDiaphragm) -> Vec<(&'static str, f64)> {
     let all = [
         ("bagging", p.bagging_time.si()),
+        ("lowering", p.lowering_time.si()),
+        ("drawing", p.drawing_time.si()),
+        ("settling", p.settling_time.si()),
+    ];
+    all.into_iter().filter(|(_, t)| *t > 0.0).collect()
+}
+
+fn single(p: &SingleDiaphragm) -> Vec<(&'static str, f64)> {
+    let all = [
+        ("stretching", p.stretching_time.si()),
         ("lowering", p.lowering_time.si()),
         ("drawing", p.drawing_time.si()),
         ("settling", p.settling_time.si()),
@@ -70,16 +100,49 @@ fn press(p: &Press) -> Vec<(&'static str, f64)> {
     all.into_iter().filter(|(_, t)| *t > 0.0).collect()
 }
 
+/// A pressure at its end, and whether a table tells its course.
+fn course(c: &PressureCourse) -> String {
+    let how = match c {
+        PressureCourse::Course(_) => ", by a table",
+        PressureCourse::Value(_) => "",
+    };
+    format!("{}{how}", quantity(c.last(), "Pa", 4))
+}
+
+fn weight_words(weight: Option<WeightDirection>) -> Option<String> {
+    let towards = match weight? {
+        WeightDirection::Tool => "weight towards the tool",
+        WeightDirection::Away => "weight away from the tool",
+    };
+    Some(towards.to_owned())
+}
+
+fn single_words(p: &SingleDiaphragm) -> Vec<String> {
+    let mm = |v: f64| quantity(v, "m", 5);
+    let mut all = vec![
+        format!(
+            "frame {} by {}",
+            mm(p.frame_length.si()),
+            mm(p.frame_width.si())
+        ),
+        format!("forming pressure {}", course(&p.forming_pressure)),
+        format!("surroundings at {}", quantity(p.surroundings.si(), "Pa", 4)),
+        format!("clearance at the start {}", mm(p.clearance.si())),
+        format!(
+            "film stretched by {} % before",
+            number(p.film_pre_stretch.0 * 100.0, 3)
+        ),
+    ];
+    if !p.bed {
+        let height = p.frame_height.map_or(0.0, |h| h.si());
+        all.push(format!("no bed, the frame ends at z = {}", mm(height)));
+    }
+    all.extend(weight_words(p.weight));
+    all
+}
+
 fn bag_words(p: &DoubleDiaphragm) -> Vec<String> {
     let mm = |v: f64| quantity(v, "m", 5);
-    let course = |c: &PressureCourse| {
-        let how = if matches!(c, PressureCourse::Course(_)) {
-            ", by a table"
-        } else {
-            ""
-        };
-        format!("{}{how}", quantity(c.last(), "Pa", 4))
-    };
     let mut all = vec![
         format!(
             "frame {} by {}",
@@ -98,10 +161,7 @@ fn bag_words(p: &DoubleDiaphragm) -> Vec<String> {
             mm(p.film_joint_margin.si())
         ),
     ];
-    all.extend(p.weight.map(|w| match w {
-        WeightDirection::Tool => "weight towards the tool".to_owned(),
-        WeightDirection::Away => "weight away from the tool".to_owned(),
-    }));
+    all.extend(weight_words(p.weight));
     all
 }
 
@@ -201,12 +261,23 @@ fn of_parts<'a>(p: &Stamping, history: &'a History) -> Vec<Curve<'a>> {
 }
 
 fn curves<'a>(process: &Process, history: &'a History) -> Vec<Curve<'a>> {
-    let all: &[(&str, &'static str, f64, bool)] = match process {
+    type Columns = &'static [(&'static str, &'static str, f64, bool)];
+    let all: Columns = match process {
         Process::DoubleDiaphragm(_) => &[
             ("bag_pressure", "pressure on the bag (kPa)", 1e-3, false),
             (
                 "cavity_pressure",
                 "pressure in the cavity (kPa)",
+                1e-3,
+                false,
+            ),
+            ("frame_height", "height of the frame (mm)", 1e3, true),
+        ],
+        // What presses on the film until the cavity is sealed is on both of its faces.
+        Process::SingleDiaphragm(_) => &[
+            (
+                "cavity_pressure",
+                "pressure under the film (kPa)",
                 1e-3,
                 false,
             ),

@@ -84,12 +84,12 @@ impl<'a> Asker<'a> {
         if self.answers.is_none() {
             return Ok(StudyProcess::DoubleDiaphragm);
         }
-        let question = "Which process, double-diaphragm or press?";
+        let question = "Which process, double-diaphragm, single-diaphragm or press?";
         let answer = self.value(None, "--process", question, Some("double-diaphragm"))?;
         let answer = answer.unwrap_or_default();
         StudyProcess::from_str(&answer, true).map_err(|_| {
             let text = format!(
-                "{answer:?} is no process here; nothing was made. Say double-diaphragm or press"
+                "{answer:?} is no process here; nothing was made. Say double-diaphragm, single-diaphragm or press"
             );
             Stop::new(exit::USAGE, text)
         })

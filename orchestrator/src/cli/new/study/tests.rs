@@ -106,6 +106,34 @@ fn a_tool_drawn_elsewhere_is_placed_and_what_a_study_names_is_copied_into_it() {
 }
 
 #[test]
+fn under_a_single_film_plies_lie_on_the_tool() {
+    with_files(|root| {
+        let mut args = args(root);
+        args.study.process = Some(StudyProcess::SingleDiaphragm);
+        let (files, told) = files(&args, &root.join("single"), None).unwrap();
+        let scene = file(&files, "scene.yaml");
+        for says in [
+            "  single_diaphragm:\n",
+            "{name: film, kind: diaphragm, material: materials/stretchlon-ht350.yaml}",
+            "tool_fabric: 0.23",
+            "stretching_time: 40 ms",
+            "weight: tool",
+        ] {
+            assert!(scene.contains(says), "{says}\n{scene}");
+        }
+        assert_eq!(scene.matches("kind: diaphragm").count(), 1, "{scene}");
+        let at = |what: &str| scene.find(what).unwrap();
+        assert!(at("name: ply_2") < at("name: film"), "{scene}");
+        for word in ["bag_pressure", "film_joint_margin", "diaphragm_diaphragm"] {
+            assert!(!scene.contains(word), "{word}\n{scene}");
+        }
+        assert!(file(&files, "workflow.yaml").contains("zone-extraction"));
+        assert!(file(&files, "materials/stretchlon-ht350.yaml").contains("plyflow_material"));
+        assert!(told.contains("--until coarse"), "{told}");
+    });
+}
+
+#[test]
 fn a_press_has_a_die_that_its_punch_goes_through_and_no_films() {
     with_files(|root| {
         let mut args = args(root);

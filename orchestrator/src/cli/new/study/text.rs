@@ -61,20 +61,26 @@ impl Study {
         let _ = writeln!(text, "plyflow_scene: 1\nname: {}\n\ntool:", self.name);
         text += &self.tool_text();
         text += "\nsheets:                     # from the tool upwards\n";
-        let bag = self.process == StudyProcess::DoubleDiaphragm;
         let film =
             |name: &str| format!("  - {{name: {name}, kind: diaphragm, material: {FILM}}}\n");
-        if bag {
+        if self.process == StudyProcess::DoubleDiaphragm {
             text += &film("lower_film");
         }
         text += &match &self.plies {
             Plies::Book(book) => self.book(book),
             _ => self.listed(),
         };
-        if bag {
-            text += &film("upper_film");
-        }
-        text + "\n" + &if bag { self.bag() } else { self.press() }
+        text += &match self.process {
+            StudyProcess::DoubleDiaphragm => film("upper_film"),
+            StudyProcess::SingleDiaphragm => film("film"),
+            StudyProcess::Press => String::new(),
+        };
+        text + "\n"
+            + &if self.process.has_films() {
+                self.bag()
+            } else {
+                self.press()
+            }
     }
 
     /// A ply for each angle.
@@ -182,12 +188,24 @@ impl Study {
         let (frame, reason) = sizes::frame(&self.part, extent);
         let (elements, _) = sizes::elements(&self.part, least);
         let [lowering, drawing] = sizes::durations(&self.part);
+        let single = self.process == StudyProcess::SingleDiaphragm;
         let mut text = comment(
             0,
-            "A guess: coefficients of a dry film on fabric and aluminium.",
+            match single {
+                true => {
+                    "A guess: coefficients of a dry film and a dry fabric on each other and on aluminium."
+                }
+                false => "A guess: coefficients of a dry film on fabric and aluminium.",
+            },
         );
-        text += "friction: {tool_diaphragm: 0.51, fabric_diaphragm: 0.40, fabric_fabric: 0.35, diaphragm_diaphragm: 0.32}\n\n";
-        text += "process:\n  double_diaphragm:\n";
+        text += match single {
+            true => {
+                "friction: {tool_diaphragm: 0.51, tool_fabric: 0.23, fabric_diaphragm: 0.40, fabric_fabric: 0.35}\n\nprocess:\n  single_diaphragm:\n"
+            }
+            false => {
+                "friction: {tool_diaphragm: 0.51, fabric_diaphragm: 0.40, fabric_fabric: 0.35, diaphragm_diaphragm: 0.32}\n\nprocess:\n  double_diaphragm:\n"
+            }
+        };
         text += &comment(4, &format!("A guess: {}.", reason.why));
         let _ = writeln!(
             text,
@@ -195,7 +213,10 @@ impl Study {
             mm(frame[0]),
             mm(frame[1])
         );
-        text += "    bag_pressure: 1 bar\n    forming_pressure: 1 bar\n    clearance: 5 mm\n";
+        text += match single {
+            true => "    forming_pressure: 1 bar\n    clearance: 5 mm\n",
+            false => "    bag_pressure: 1 bar\n    forming_pressure: 1 bar\n    clearance: 5 mm\n",
+        };
         text += &comment(
             4,
             &format!(
@@ -203,13 +224,23 @@ impl Study {
                 lowering.why
             ),
         );
+        let first = if single {
+            "stretching_time: 40 ms"
+        } else {
+            "bagging_time: 80 ms"
+        };
         let _ = write!(
             text,
-            "    bagging_time: 80 ms\n    lowering_time: {}\n    drawing_time: {}\n    settling_time: 40 ms\n    film_pre_stretch: 0.01\n    film_joint_margin: {}\n",
-            lowering.value,
-            drawing.value,
-            mm((4.0 * elements.whole).max(0.03))
+            "    {first}\n    lowering_time: {}\n    drawing_time: {}\n    settling_time: 40 ms\n    film_pre_stretch: 0.01\n",
+            lowering.value, drawing.value,
         );
+        if single {
+            text += &comment(4, "What holds the plies on the tool before the film does.");
+            text += "    weight: tool\n";
+        } else {
+            let margin = mm((4.0 * elements.whole).max(0.03));
+            let _ = writeln!(text, "    film_joint_margin: {margin}");
+        }
         text
     }
 
@@ -252,9 +283,9 @@ impl Study {
             "Written by `plyflow new study`. Run it step by step (`--until`), look, and then go on: what is done is not done again.",
         );
         let _ = write!(text, "plyflow: 1\nname: {}\n\nsteps:\n", self.name);
-        text + &match self.process {
-            StudyProcess::DoubleDiaphragm => self.bag_steps(),
-            StudyProcess::Press => self.press_steps(),
+        text + &match self.process.has_films() {
+            true => self.bag_steps(),
+            false => self.press_steps(),
         }
     }
 

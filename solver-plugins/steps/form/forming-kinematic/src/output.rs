@@ -69,7 +69,7 @@ pub(crate) fn run(host: &Host) -> Result<(), StepError> {
     let mut done = Vec::new();
     // In a press the height is free, and the tool stands on what is below it.
     let bed = match p.scene.process {
-        Process::DoubleDiaphragm(_) => 0.0,
+        Process::DoubleDiaphragm(_) | Process::SingleDiaphragm(_) => 0.0,
         Process::Press(_) | Process::Stamping(_) => tool.bounds()[0][2],
     };
     let over = Over {

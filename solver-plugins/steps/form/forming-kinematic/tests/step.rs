@@ -168,6 +168,27 @@ fn bytes_are_the_same_twice() {
 }
 
 #[test]
+fn under_a_single_film_the_lowest_ply_lies_on_the_tool_itself() {
+    let mut scene = scene(hemisphere(), [0.06, 0.06], [0.0, 90.0]);
+    scene["sheets"].as_array_mut().unwrap().remove(0);
+    scene["friction"]["tool_fabric"] = json!(0.2);
+    scene["process"] = json!({"single_diaphragm": {
+        "frame_length": "1 m", "frame_width": "1 m", "clearance": "0.005 m", "forming_pressure": "1e5 Pa",
+        "stretching_time": "0.1 s", "lowering_time": "0.1 s", "drawing_time": "0.1 s", "settling_time": "0.1 s",
+    }});
+    let bed = drape(json!({"scene": scene, "element_size": 0.004})).unwrap();
+    assert_eq!(bed.attributes["without_bed"], json!(false));
+    for (name, offset) in [("ply_1", 0.5 * PLY), ("ply_2", 1.5 * PLY)] {
+        for x in last(&bed, name) {
+            assert!((norm(x) - 0.05 - offset).abs() < 2e-8, "{name}: {x:?}");
+        }
+    }
+    scene["process"]["single_diaphragm"]["bed"] = json!(false);
+    let none = drape(json!({"scene": scene, "element_size": 0.004})).unwrap();
+    assert_eq!(none.attributes["without_bed"], json!(true));
+}
+
+#[test]
 fn ply_that_reaches_the_bed_is_marked_there_and_draped_elsewhere() {
     let formed = on_hemisphere(0.18, json!({"locking_angle": 1.5})).unwrap();
     let coverage = formed.result("coverage");

@@ -1,4 +1,4 @@
-//! The contacts of a stack between two films.
+//! The contacts of a stack between two films, or under one.
 
 use crate::error::Result;
 use crate::request::Parameters;
@@ -13,8 +13,8 @@ use std::sync::Arc;
 /// The lower film; it lies between the tool and everything else.
 const BOTTOM: StackPlace = StackPlace(0);
 
-/// Sets up all contacts of a stack of the scene, or of those of its sheets that a zone has. `placed` is in stack order (first and last are
-/// the films).
+/// Sets up all contacts of a stack between two films, of the scene or of those of its sheets that a zone has. `placed` is in stack order (first
+/// and last are the films).
 ///
 /// # Errors
 /// When a friction coefficient is missing or makes no sense.
@@ -59,6 +59,61 @@ pub fn add_contacts(
     let mut contact = contacts.on_rigid(model, &part, top, &[BOTTOM], name)?;
     (contact.share, contact.counted) = (0.5, 0.0);
     model.add_rigid_contact(contact);
+    for ply in plies {
+        contacts.add_folds(model, *ply)?;
+    }
+    model.set_contact_stiffness(&p.contact_settings());
+    Ok(())
+}
+
+/// The same of plies that lie on the tool under one film, the last of `placed`. Every sheet may lie on the tool, and on the `bed` where there is one.
+///
+/// # Errors
+/// When a friction coefficient is missing or makes no sense.
+pub fn add_contacts_under_one(
+    model: &mut Model,
+    stack: &[StackSheet],
+    placed: &[Placed],
+    p: &Parameters,
+    (tool, bed): (&mut ToolSurfaces, bool),
+) -> Result<()> {
+    let contacts = StackContacts::new(stack, p);
+    let layers = layers(placed);
+    let film = layers[layers.len() - 1];
+    let plies = &layers[..film.place.0];
+    for pair in plies.windows(2) {
+        contacts.add_pair(model, pair[1], pair[0], 1.0)?;
+    }
+    // The plies' nodes carry the film, as between two films.
+    if let Some(last) = plies.last() {
+        contacts.add_pair(model, *last, film, -1.0)?;
+    }
+    contacts.add_past(model, &layers)?;
+    for name in [RigidName::Tool, RigidName::Bed] {
+        if name == RigidName::Bed && !bed {
+            continue;
+        }
+        let mut part_for = |model: &Model, sheet| RigidPart {
+            name: name.clone(),
+            surface: match name {
+                RigidName::Bed => Arc::new(Plane { height: 0.0 }),
+                _ => tool.of(model, sheet),
+            },
+            above: false,
+            film: None,
+            moves: false,
+        };
+        for (k, ply) in plies.iter().enumerate() {
+            let part = part_for(model, ply.sheet);
+            let among: Vec<StackPlace> = plies[..k].iter().map(|below| below.place).collect();
+            contacts.add_rigid(model, &part, *ply, &among)?;
+        }
+        // Beyond the plies the film lies on it itself.
+        let part = part_for(model, film.sheet);
+        let of_both = format!("{}/{}", name.word(), contacts.name(film.place));
+        let contact = contacts.on_rigid(model, &part, film, &[], of_both)?;
+        model.add_rigid_contact(contact);
+    }
     for ply in plies {
         contacts.add_folds(model, *ply)?;
     }

@@ -1,4 +1,4 @@
-//! The films of a bag: two surfaces that are one where they are joined.
+//! The films of a bag, one or two: two are surfaces that are one where they are joined.
 
 use crate::build::layout::Layout;
 use crate::error::Result;
@@ -21,7 +21,7 @@ fn film_element(
     Ok(element)
 }
 
-/// Adds the lower film, the first sheet of all. Gives its nodes in the frame.
+/// Adds the lower film of two, the first sheet of all. Gives its nodes in the frame.
 ///
 /// # Errors
 /// When its element cannot be made or is not its own mirror image.
@@ -31,15 +31,45 @@ pub fn add_bottom(
     film: &StackSheet,
     elements: &Elements<'_>,
 ) -> Result<Vec<u32>> {
+    let stands_for = |c: &[u32; 4]| match at.is_joined(c) {
+        true => (2.0, Pressed::Both),
+        false => (1.0, Pressed::Below),
+    };
+    add_clamped(parts, at, (film, at.bottom_z), stands_for, elements)
+}
+
+/// Adds a single film at height `z` (m), between the surroundings and the cavity. Gives its nodes in the frame.
+///
+/// # Errors
+/// As [`add_bottom`].
+pub fn add_single(
+    parts: &mut Parts,
+    at: &Layout,
+    (film, z): (&StackSheet, f64),
+    elements: &Elements<'_>,
+) -> Result<Vec<u32>> {
+    add_clamped(parts, at, (film, z), |_| (1.0, Pressed::Both), elements)
+}
+
+/// Adds a flat film at height `z` (m) that the frame clamps all around. `stands_for`: for how many layers a cell stands, and what presses on it.
+fn add_clamped(
+    parts: &mut Parts,
+    at: &Layout,
+    (film, z): (&StackSheet, f64),
+    stands_for: impl Fn(&[u32; 4]) -> (f64, Pressed),
+    elements: &Elements<'_>,
+) -> Result<Vec<u32>> {
     let mesh = &at.film;
+    let first = parts.points.len() as u32;
     let plan = mesh.points.iter();
-    parts.points.extend(plan.map(|q| [q[0], q[1], at.bottom_z]));
+    parts.points.extend(plan.map(|q| [q[0], q[1], z]));
     let boundary = on_outer_boundary(mesh, at.planes);
-    let mut nodes: Vec<u32> = (0..mesh.points.len() as u32).collect();
-    let (frame, slaves) = (nodes.iter()).partition::<Vec<u32>, _>(|n| boundary[**n as usize]);
+    let mut nodes: Vec<u32> = (first..parts.points.len() as u32).collect();
+    let (frame, slaves) =
+        (nodes.iter()).partition::<Vec<u32>, _>(|n| boundary[(**n - first) as usize]);
     let element = film_element(film, at, elements)?;
     let patches = parts.patches(&mut nodes, mesh, &element);
-    let joined = || mesh.cells.iter().map(|c| at.is_joined(c));
+    let (layers, pressed) = mesh.cells.iter().map(stands_for).unzip();
     let meshed = Meshed {
         nodes,
         cells: mesh.cells.clone(),
@@ -53,10 +83,8 @@ pub fn add_bottom(
         }
     };
     let spec = SheetSpec {
-        layers: joined().map(|j| if j { 2.0 } else { 1.0 }).collect(),
-        pressed: joined()
-            .map(|j| if j { Pressed::Both } else { Pressed::Below })
-            .collect(),
+        layers,
+        pressed,
         // Away from plies and tool nothing presses on the film: there it keeps its own mass.
         least_areal_mass: mesh.cells.iter().map(least).collect(),
         ..plain(film, meshed, element, elements.p)

@@ -4,16 +4,29 @@ use crate::error::{FormingError, Result};
 use crate::request::Parameters;
 use crate::stack::{StackSheet, sheet};
 use plyflow_blank::Blank;
-use plyflow_geometry::rectangle::{Rectangle, grown, holds_inside, hull};
+use plyflow_geometry::rectangle::{Rectangle, grown, holds_inside, hull, intersection};
 use plyflow_mechanics::mesh::{QuadMesh, graded_axis};
 use plyflow_mechanics::mirror::Planes;
 use plyflow_model::budget::{self, Wanted};
-use plyflow_model::scene::DoubleDiaphragm;
 use plyflow_tooling::ToolMesh;
+
+/// What clamps films, and how far they are fine.
+pub struct Frame {
+    /// The word of the process.
+    pub process: &'static str,
+    /// Length and width of its opening (m).
+    pub opening: [f64; 2],
+    /// Height (m) of the lowest sheet over the tool's highest point at the start.
+    pub clearance: f64,
+    /// Distance (m) around the plies beyond which two films count as one, of a process that has two.
+    pub joint: Option<f64>,
+    /// Whether it comes down around the tool. Otherwise it may end on the tool.
+    pub around_tool: bool,
+}
 
 /// Places of everything before meshing.
 pub struct Layout {
-    /// Height of the lower film's mid-plane (m).
+    /// Height of the lowest sheet's mid-plane (m).
     pub bottom_z: f64,
     /// Of the plies, from the tool upwards: the parts of their blanks between mirror planes.
     pub plies: Vec<Blank>,
@@ -36,17 +49,18 @@ impl Layout {
     /// When the frame is too small, the films' elements are finer than the plies' or too many, or a blank has no shape.
     pub fn new(
         stack: &[StackSheet],
-        process: &DoubleDiaphragm,
+        frame: &Frame,
         p: &Parameters,
         tool: &ToolMesh,
         planes: Planes,
     ) -> Result<Self> {
         let [lo, hi] = tool.bounds();
-        let plies: Vec<Blank> = stack[1..stack.len() - 1]
+        let plies: Vec<Blank> = stack
             .iter()
+            .filter(|sheet| sheet.is_ply())
             .map(|sheet| sheet::blank_part(sheet, planes))
             .collect::<Result<_>>()?;
-        // There is one: `sheet::stack` refuses what is not one or more plies between two films.
+        // There is one: `sheet::stack` refuses a stack of films alone.
         let all_plies = plies[1..]
             .iter()
             .map(Blank::bounds)
@@ -60,14 +74,15 @@ impl Layout {
             )));
         }
         // At least three cells of free film around the plies, so that the step at their edge has room.
-        let margin = process.film_joint_margin.si().max(3.0 * film_size);
+        let margin = frame.joint.unwrap_or(0.0).max(3.0 * film_size);
         let joint = grown(all_plies, margin);
-        let fine = hull(
-            grown(joint, film_size),
-            grown([lo[0], lo[1], hi[0], hi[1]], 0.03),
-        );
-        let half = [process.frame_length.si(), process.frame_width.si()].map(|full| 0.5 * full);
-        check_frame(half, fine, margin, film_size)?;
+        let half = frame.opening.map(|full| 0.5 * full);
+        let mut around = grown([lo[0], lo[1], hi[0], hi[1]], 0.03);
+        if !frame.around_tool {
+            around = intersection(around, [-half[0], -half[1], half[0], half[1]]);
+        }
+        let fine = hull(grown(joint, film_size), around);
+        check_frame(half, fine, margin, film_size, frame)?;
         let fine_part = [0, 1].map(|k| fine[k + 2] - if planes.0[k] { 0.0 } else { fine[k] });
         allow_film(fine_part[0] * fine_part[1], p)?;
         // A grid line lies on every mirror plane.
@@ -81,7 +96,7 @@ impl Layout {
             graded_axis(low, half[k], fine_low, high, film_size, growth)
         };
         Ok(Self {
-            bottom_z: hi[2] + process.clearance.si() + stack[0].offset,
+            bottom_z: hi[2] + frame.clearance + stack[0].offset,
             plies,
             all_plies,
             joint,
@@ -119,14 +134,29 @@ impl Layout {
 }
 
 /// Whether the frame, of these half sizes (m), holds what is to be fine; `margin`: free film around the plies (m).
-fn check_frame(half: [f64; 2], fine: Rectangle, margin: f64, film_size: f64) -> Result<()> {
+fn check_frame(
+    half: [f64; 2],
+    fine: Rectangle,
+    margin: f64,
+    film_size: f64,
+    frame: &Frame,
+) -> Result<()> {
     if (0..2).all(|k| fine[k] >= -half[k] && fine[k + 2] <= half[k]) {
         return Ok(());
     }
+    let at_least = match frame.joint {
+        Some(_) => "`film_joint_margin`, at least three elements",
+        None => "three elements",
+    };
+    let tool = match frame.around_tool {
+        true => ", and the tool with 30 mm",
+        false => "",
+    };
     Err(FormingError::Scene(format!(
-        "process.double_diaphragm: the frame ({} x {} m) is too small; expected at least {:.3} x {:.3} m: the plies with {:.0} mm of free \
-         film around them (`film_joint_margin`, at least three elements of {:.1} mm, `diaphragm_element_size` or `element_size`) and one \
-         more element, and the tool with 30 mm. Enlarge `frame_length` and `frame_width`, or take less of these",
+        "process.{}: the frame ({} x {} m) is too small; expected at least {:.3} x {:.3} m: the plies with {:.0} mm of free \
+         film around them ({at_least} of {:.1} mm, `diaphragm_element_size` or `element_size`) and one \
+         more element{tool}. Enlarge `frame_length` and `frame_width`, or take less of these",
+        frame.process,
         2.0 * half[0],
         2.0 * half[1],
         2.0 * fine[2].max(-fine[0]),

@@ -11,6 +11,7 @@ pub mod grips;
 pub mod layout;
 pub mod plates;
 pub mod press;
+pub mod rim;
 pub mod stamping;
 pub mod travel;
 pub mod under;
@@ -23,7 +24,7 @@ use crate::error::Result;
 use crate::forming::Forming;
 use crate::request::Parameters;
 use crate::stack::Components;
-use bag::build_bag;
+use bag::{Bag, build_bag};
 use plyflow_model::scene::Process;
 use press::build_press;
 use stamping::build_stamping;
@@ -34,7 +35,8 @@ use stamping::build_stamping;
 /// What of the scene or the parameters makes no model.
 pub fn build_global(p: &Parameters, components: &dyn Components) -> Result<Forming> {
     match &p.scene.process {
-        Process::DoubleDiaphragm(process) => build_bag(p, process, components),
+        Process::DoubleDiaphragm(process) => build_bag(p, Bag::Double(process), components),
+        Process::SingleDiaphragm(process) => build_bag(p, Bag::Single(process), components),
         Process::Press(press) => build_press(p, press, components),
         Process::Stamping(stamping) => build_stamping(p, stamping, components),
     }

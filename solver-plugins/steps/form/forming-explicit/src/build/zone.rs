@@ -1,11 +1,11 @@
 //! The model of one zone, driven at its cut by a coarse run.
 
 use crate::boundary::{Beginning, CutDrive};
-use crate::build::bag_contacts::add_contacts;
+use crate::build::bag::Bag;
 use crate::build::dies::{Dies, Sheets, in_press, in_stamping};
 use crate::error::{FormingError, Result};
 use crate::forming::Forming;
-use crate::load::{Cycle, Load};
+use crate::load::Load;
 use crate::request::{LocalInput, LocalSheet, Parameters};
 use crate::stack::{
     Body, Components, Elements, Meshed, Parts, RigidName, StackSheet, ToolSurfaces, plain, sheet,
@@ -14,7 +14,7 @@ use crate::stack::{
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::model::Model;
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
-use plyflow_model::scene::{DoubleDiaphragm, Process, Scene, SheetKind};
+use plyflow_model::scene::{Process, Scene, SheetKind};
 use plyflow_tooling::RigidTool;
 
 /// Builds the model of a zone.
@@ -41,7 +41,8 @@ pub fn build_local(
         input: &input,
     };
     let dies = match &p.scene.process {
-        Process::DoubleDiaphragm(process) => in_bag(p, process, &tool, &sheets, &mut model),
+        Process::DoubleDiaphragm(of) => in_bag(p, Bag::Double(of), &tool, &sheets, &mut model),
+        Process::SingleDiaphragm(of) => in_bag(p, Bag::Single(of), &tool, &sheets, &mut model),
         Process::Press(press) => in_press(p, press, &tool, &sheets, &mut model),
         Process::Stamping(stamping) => in_stamping(p, stamping, &tool, &sheets, &mut model),
     }?;
@@ -65,23 +66,24 @@ pub fn build_local(
     })
 }
 
-/// Puts a zone between films over the tool, under the pressures of the run of the whole.
+/// Puts a zone between films, or under one, over the tool, under the pressures of the run of the whole.
 fn in_bag(
     p: &Parameters,
-    process: &DoubleDiaphragm,
+    bag: Bag<'_>,
     tool: &RigidTool,
     sheets: &Sheets<'_>,
     model: &mut Model,
 ) -> Result<Dies> {
     let input = sheets.input;
     if input.cavity.len() != input.time.len() {
-        let text = "the boundary does not tell the pressure in the cavity over time, which presses on a zone between films; run its step again, on a run of this scene";
+        let text = "the boundary does not tell the pressure in the cavity over time, which presses on the films of a zone; run its step again, on a run of this scene";
         return Err(FormingError::Input(text.into()));
     }
     let last = input.time.len() - 1;
-    let cycle = Cycle::new(process, [input.frame[0], input.frame[last]]).slowed(input.slower);
+    let frame = [input.frame[0], input.frame[last]];
+    let cycle = bag.cycle(frame).slowed(input.slower);
     let mut surfaces = ToolSurfaces::new(tool.field.clone());
-    add_contacts(model, sheets.stack, sheets.placed, p, &mut surfaces)?;
+    bag.add_contacts(model, sheets.stack, sheets.placed, p, &mut surfaces)?;
     Ok(Dies {
         load: Load::Given {
             time: input.time.clone(),
@@ -102,13 +104,14 @@ fn stack_of(scene: &Scene, input: &LocalInput) -> Result<Vec<StackSheet>> {
     let mut stack: Vec<_> = whole.into_iter().filter(|s| has(&s.scene.name)).collect();
     // A ply that does not reach into the zone holds nothing off the tool there.
     sheet::lay(&mut stack);
-    let bagged = matches!(scene.process, Process::DoubleDiaphragm(_));
+    let bag = Bag::of(&scene.process);
     let plies = stack.iter().filter(|s| s.is_ply()).count();
     let films = stack.len() - plies;
-    if plies == 0 || (bagged && films != 2) {
-        let expected = match bagged {
-            true => "both diaphragms and at least one ply",
-            false => "at least one ply",
+    if plies == 0 || bag.is_some_and(|bag| films != bag.films()) {
+        let expected = match bag {
+            Some(Bag::Double(_)) => "both diaphragms and at least one ply",
+            Some(Bag::Single(_)) => "the diaphragm and at least one ply",
+            None => "at least one ply",
         };
         let names: Vec<&str> = input.sheets.iter().map(|s| s.name.as_str()).collect();
         return Err(FormingError::Input(format!(
@@ -138,15 +141,15 @@ fn sheets_of(
         nodes: Vec::new(),
         drive: CutDrive::new(input.time.clone()),
     };
+    let bag = Bag::of(&elements.p.scene.process);
     for sheet in stack {
         let of_name = |s: &&LocalSheet| s.name == sheet.scene.name;
         let local = input.sheets.iter().find(of_name).expect("filtered");
         let first = parts.points.len() as u32;
         parts.points.extend_from_slice(&local.points);
-        let pressed = match (sheet.scene.kind, parts.specs.is_empty()) {
-            (SheetKind::Diaphragm, true) => Pressed::Below,
-            (SheetKind::Diaphragm, false) => Pressed::Above,
-            (SheetKind::Ply, _) => Pressed::No,
+        let pressed = match (sheet.scene.kind, bag) {
+            (SheetKind::Diaphragm, Some(bag)) => bag.presses(parts.specs.is_empty()),
+            (SheetKind::Diaphragm, None) | (SheetKind::Ply, _) => Pressed::No,
         };
         let element = match sheet.scene.kind {
             SheetKind::Diaphragm => elements.of_film(sheet)?,

@@ -7,7 +7,6 @@ use crate::load::Load;
 use crate::request::Parameters;
 use crate::stack::{Body, RigidName};
 use crate::watch::Watch;
-use plyflow_model::scene::Process;
 
 /// Mass that is added over the sheets' own, beyond which a run is none of these sheets. Shipped studies have up to 75 in films.
 const MOST_ADDED: f64 = 1000.0;
@@ -72,10 +71,16 @@ fn check_elements(p: &Parameters, forming: &Forming) -> Result<()> {
 /// Phases in which something moves: their names in a scene, and how long they take (s).
 fn phases(forming: &Forming) -> Vec<(&'static str, f64)> {
     match &forming.load {
-        Load::Process { cycle, .. } => ["bagging_time", "lowering_time", "drawing_time"]
-            .into_iter()
-            .zip(cycle.durations)
-            .collect(),
+        Load::Process { cycle, .. } => {
+            let first = match cycle.first {
+                "stretching" => "stretching_time",
+                _ => "bagging_time",
+            };
+            [first, "lowering_time", "drawing_time"]
+                .into_iter()
+                .zip(cycle.durations)
+                .collect()
+        }
         Load::Press(press) => vec![("forming_time", press.stroke.forming)],
         Load::Stamping(stamping) => vec![("forming_time", stamping.forming)],
         Load::Given { .. } => Vec::new(),
@@ -128,13 +133,11 @@ fn check_masses(p: &Parameters, forming: &Forming) -> Result<()> {
 /// Whether damping leaves the motion to what forms.
 fn check_drag(p: &Parameters, forming: &Forming) -> Result<()> {
     let m = &forming.model;
-    let (speed, pressure) = match (&forming.load, &p.scene.process) {
-        (Load::Process { cycle, .. }, Process::DoubleDiaphragm(_)) => {
-            let way = (cycle.frame[0] - cycle.frame[1]).abs();
-            (way / cycle.durations[1].max(1e-9), cycle.bag)
-        }
-        _ => return Ok(()),
+    let Load::Process { cycle, .. } = &forming.load else {
+        return Ok(());
     };
+    let way = (cycle.frame[0] - cycle.frame[1]).abs();
+    let (speed, pressure) = (way / cycle.durations[1].max(1e-9), cycle.bag);
     let area: f64 = (m.sheets().iter())
         .flat_map(|s| &m.cells()[s.cell_range.0..s.cell_range.1])
         .map(|c| {

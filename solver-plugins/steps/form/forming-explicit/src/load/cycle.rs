@@ -1,13 +1,15 @@
-//! The process of double-diaphragm forming in time: bagging, lowering, drawing, settling.
+//! Forming under films in time: bagging or stretching, lowering, drawing, settling.
 
 use plyflow_mechanics::history::{MonotoneCubic, smooth_step};
 use plyflow_model::STANDARD_GRAVITY;
-use plyflow_model::scene::{DoubleDiaphragm, PressureCourse, WeightDirection};
+use plyflow_model::scene::{DoubleDiaphragm, PressureCourse, SingleDiaphragm, WeightDirection};
 
 /// Pressures and frame height of the process.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cycle {
-    /// Pressure of the surroundings over the bag's vacuum at the end (Pa).
+    /// Name of the first phase.
+    pub first: &'static str,
+    /// Pressure of the surroundings over the bag's vacuum at the end (Pa). Under one film there is no bag: over vacuum.
     pub bag: f64,
     /// Its course (Pa) over the share of bagging; none: it rises smoothly in the second half.
     pub bag_course: Option<MonotoneCubic>,
@@ -17,7 +19,7 @@ pub struct Cycle {
     pub drawn_course: Option<MonotoneCubic>,
     /// Durations of the four phases (s).
     pub durations: [f64; 4],
-    /// Frame height at start and end (m), of the lower film's mid-plane.
+    /// Frame height at start and end (m), of the mid-plane of the film that meets the bed.
     pub frame: [f64; 2],
     /// Strain by which the frame stretches the films before the bag is evacuated.
     pub pre_stretch: f64,
@@ -31,6 +33,7 @@ impl Cycle {
         let bag = p.bag_pressure.last();
         let drawn = p.forming_pressure.last();
         Self {
+            first: "bagging",
             bag,
             bag_course: course(&p.bag_pressure),
             cavity_end: (bag - drawn).max(0.0),
@@ -43,11 +46,29 @@ impl Cycle {
             ],
             frame,
             pre_stretch: p.film_pre_stretch.0,
-            weight: match p.weight {
-                None => 0.0,
-                Some(WeightDirection::Tool) => -STANDARD_GRAVITY,
-                Some(WeightDirection::Away) => STANDARD_GRAVITY,
-            },
+            weight: fall(p.weight),
+        }
+    }
+
+    /// The same of a single film. The surroundings press on both of its faces until the cavity is sealed, so it does not matter over which
+    /// part of stretching they come.
+    pub fn of_single(p: &SingleDiaphragm, frame: [f64; 2]) -> Self {
+        let drawn = p.forming_pressure.last();
+        Self {
+            first: "stretching",
+            bag: p.surroundings.si(),
+            bag_course: None,
+            cavity_end: (p.surroundings.si() - drawn).max(0.0),
+            drawn_course: course(&p.forming_pressure),
+            durations: [
+                p.stretching_time.si(),
+                p.lowering_time.si(),
+                p.drawing_time.si(),
+                p.settling_time.si(),
+            ],
+            frame,
+            pre_stretch: p.film_pre_stretch.0,
+            weight: fall(p.weight),
         }
     }
 
@@ -79,7 +100,7 @@ impl Cycle {
         for (d, name) in self
             .durations
             .iter()
-            .zip(["bagging", "lowering", "drawing"])
+            .zip([self.first, "lowering", "drawing"])
         {
             end += d;
             if t < end {
@@ -133,6 +154,15 @@ impl Cycle {
             None => return None,
         };
         Some((self.bag - drawn).max(0.0))
+    }
+}
+
+/// Acceleration of free fall along z (m/s2).
+fn fall(weight: Option<WeightDirection>) -> f64 {
+    match weight {
+        None => 0.0,
+        Some(WeightDirection::Tool) => -STANDARD_GRAVITY,
+        Some(WeightDirection::Away) => STANDARD_GRAVITY,
     }
 }
 
@@ -250,5 +280,26 @@ mod tests {
             let w = cycle.wanted_in_cavity(t).unwrap();
             assert!((w - wanted).abs() < 1e-9, "{t} s: {w} Pa");
         }
+    }
+
+    #[test]
+    fn a_single_film_is_stretched_and_then_drawn_from_the_pressure_around_it() {
+        let process = json!({
+            "frame_length": "1 m", "frame_width": "1 m", "clearance": "0.01 m", "forming_pressure": "60000 Pa", "surroundings": "80000 Pa",
+            "stretching_time": "0.2 s", "lowering_time": "0.3 s", "drawing_time": "0.4 s", "settling_time": "0.1 s",
+            "film_pre_stretch": 0.02, "weight": "tool"});
+        let cycle = Cycle::of_single(&serde_json::from_value(process).unwrap(), [0.1, 0.0]);
+        let names = [0.1, 0.3, 0.6, 0.95].map(|t| cycle.phase(t));
+        assert_eq!(names, ["stretching", "lowering", "drawing", "settling"]);
+        assert_eq!((cycle.bag, cycle.cavity_end), (8e4, 2e4));
+        assert_eq!(
+            (cycle.stretch(0.2), cycle.fall(0.2)),
+            (0.02, -STANDARD_GRAVITY)
+        );
+        assert_eq!(
+            (cycle.frame_height(0.2), cycle.frame_height(0.5)),
+            (0.1, 0.0)
+        );
+        assert!((cycle.wanted_in_cavity(1.0).unwrap() - 2e4).abs() < 1e-9);
     }
 }

@@ -97,7 +97,7 @@ pub fn read_boundary(host: &Host, input: &Input, scene: &Scene) -> Result<LocalI
 /// Ways of the parts of the scene that are pressed, as far as the boundary tells them.
 fn read_ways(host: &Host, input: &Input, scene: &Scene) -> Result<Vec<RecordedWay>> {
     let names: Vec<&str> = match &scene.process {
-        Process::DoubleDiaphragm(_) => Vec::new(),
+        Process::DoubleDiaphragm(_) | Process::SingleDiaphragm(_) => Vec::new(),
         Process::Press(_) => vec!["holder"],
         Process::Stamping(stamping) => (stamping.parts.iter())
             .filter(|p| matches!(p.motion, Some(PartMotion::Pressed(_))))

@@ -66,7 +66,16 @@ impl ToolSurfaces {
 
     /// What a sheet of the model sees, while it is flat.
     pub fn of(&mut self, model: &Model, sheet: SheetIndex) -> Arc<dyn RigidSurface> {
-        let size = typical_size(model, sheet, self.distance.tool_bounds());
+        let cells = sheet.cells(model).iter();
+        self.of_cells(cells.map(|cell| cell.map(|n| model.x()[n as usize])))
+    }
+
+    /// What a flat sheet sees whose cells have these corners (m).
+    pub fn of_cells(
+        &mut self,
+        cells: impl Iterator<Item = [Vec3; 4]> + Clone,
+    ) -> Arc<dyn RigidSurface> {
+        let size = typical_size(cells, self.distance.tool_bounds());
         let same = |(s, _): &&(f64, _)| (s - size).abs() < SAME_SIZE * size;
         if let Some((_, surface)) = self.made.iter().find(same) {
             return surface.clone();
@@ -79,23 +88,17 @@ impl ToolSurfaces {
 
 /// The side (m) of a square as large as the median element of a flat sheet over the tool, whose box is given: towards the frame a film's
 /// elements grow, and of a large frame most may be large. Of one that lies nowhere over it, of all its elements.
-fn typical_size(model: &Model, sheet: SheetIndex, [low, high]: [Vec3; 2]) -> f64 {
-    let corners = |cell: &[u32; 4]| cell.map(|n| model.x()[n as usize]);
-    let area = |cell: &&[u32; 4]| {
-        let [a, b, c, d] = corners(cell);
-        0.5 * norm(cross(sub(c, a), sub(d, b)))
-    };
-    let is_over = |cell: &&[u32; 4]| {
-        let corners = corners(cell);
+fn typical_size(cells: impl Iterator<Item = [Vec3; 4]> + Clone, [low, high]: [Vec3; 2]) -> f64 {
+    let area = |[a, b, c, d]: [Vec3; 4]| 0.5 * norm(cross(sub(c, a), sub(d, b)));
+    let is_over = |corners: &[Vec3; 4]| {
         (0..2).all(|k| {
             let centre = 0.25 * corners.iter().map(|x| x[k]).sum::<f64>();
             low[k] <= centre && centre <= high[k]
         })
     };
-    let cells = sheet.cells(model);
-    let mut areas: Vec<f64> = cells.iter().filter(is_over).map(|c| area(&c)).collect();
+    let mut areas: Vec<f64> = cells.clone().filter(is_over).map(area).collect();
     if areas.is_empty() {
-        areas = cells.iter().map(|c| area(&c)).collect();
+        areas = cells.map(area).collect();
     }
     areas.sort_by(f64::total_cmp);
     areas.get(areas.len() / 2).map_or(0.0, |a| a.sqrt())

@@ -118,7 +118,8 @@ fn parts(forming: &Forming) -> Vec<Part> {
             error: forming.field_error(&RigidName::Tool),
         });
     }
-    if !forming.load.moves_parts() {
+    let contacts = forming.model.rigid_contacts();
+    if contacts.iter().any(|c| RigidName::Bed.is_of(&c.name)) {
         parts.push(Part {
             name: RigidName::Bed,
             shape: Shape::Bed,

@@ -96,6 +96,21 @@ pub fn bag(count: usize, change: impl FnOnce(&mut Value)) -> Parameters {
     serde_json::from_value(all).expect("the parameters fit their type")
 }
 
+/// Plies on a rounded block 20 mm high under one film; `change` has the last word.
+pub fn single(count: usize, change: impl FnOnce(&mut Value)) -> Parameters {
+    bag(count, |p| {
+        let scene = &mut p["scene"];
+        let sheets = scene["sheets"].as_array_mut().expect("a list");
+        sheets.remove(0);
+        scene["friction"] = json!({"tool_diaphragm": 0.5, "tool_fabric": 0.23, "fabric_diaphragm": 0.4, "fabric_fabric": 0.35});
+        scene["process"] = json!({"single_diaphragm": {
+            "frame_length": "0.4 m", "frame_width": "0.34 m", "clearance": "0.005 m", "forming_pressure": "100000 Pa",
+            "stretching_time": "0.02 s", "lowering_time": "0.1 s", "drawing_time": "0.12 s", "settling_time": "0.03 s",
+            "film_pre_stretch": 0.01}});
+        change(p);
+    })
+}
+
 /// The beginning of a press stroke on a woven ply over a small dome: fibre family 1 at `fibre_1` (rad).
 pub fn gentle_press(element: &str, fibre_1: f64, symmetry: &[&str]) -> Parameters {
     press(1, &json!({"force": "100 N"}), |p| {

@@ -14,6 +14,7 @@ mod process;
 mod quiet_bag;
 mod refused;
 mod regions;
+mod single_film;
 mod sliding;
 mod small_part;
 mod stamping;
