@@ -53,6 +53,7 @@ pub fn plain(
         cells: meshed.cells,
         patches: meshed.patches,
         axis: sheet::axis(&sheet.scene),
+        steered: None,
         layers: vec![1.0; count],
         pressed: vec![Pressed::No; count],
         least_areal_mass: vec![p.least_areal_mass; count],
