@@ -8,6 +8,7 @@
 
 mod boundary;
 mod csv;
+mod curves;
 mod deck;
 mod dxf;
 mod error;
@@ -24,7 +25,8 @@ mod vtu;
 pub use error::ExportError;
 pub use fibres::{Sheared, deviations, sheared};
 pub use file::File;
-pub use net::{Fibre, Net, TooMany, fibres};
+pub use curves::{Field, pieces};
+pub use net::{Fibre, Net, TooMany, fibres, laid_fibres};
 pub use request::{Format, Frames, LengthUnit, Request};
 
 use part::Part;
