@@ -4,7 +4,7 @@
 //! it follows its direction both ways: curves come nearer to each other where steering brings them together. Where they leave a gap, or a hole of the ply
 //! does, more begin.
 
-use crate::net::{Fibre, MOST, Net, TooMany, rounded_up};
+use crate::net::{Fibre, MOST, Net, TooMany, fibres, rounded_up};
 use crate::vec3::{Vec3, add_scaled, scaled};
 use plyflow_fixed::FixedBits;
 use plyflow_model::outline::{Point, cross};
@@ -256,19 +256,46 @@ impl<'a> Locator<'a> {
 
 /// The box around cells: x0, y0, x1, y1.
 fn around<'c>(net: &Net<'_>, cells: impl Iterator<Item = &'c usize>) -> [f64; 4] {
-    let none = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
+    let none = [
+        f64::INFINITY,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::NEG_INFINITY,
+    ];
     let nodes = cells.flat_map(|c| net.corners(*c));
     nodes.fold(none, |b, i| {
         let p = net.flat[*i as usize];
-        [b[0].min(p[0]), b[1].min(p[1]), b[2].max(p[0]), b[3].max(p[1])]
+        [
+            b[0].min(p[0]),
+            b[1].min(p[1]),
+            b[2].max(p[0]),
+            b[3].max(p[1]),
+        ]
     })
+}
+
+/// Lines of a family (0 or 1) as a ply was laid: straight ones as [`fibres()`] has them, and curves where the fibres are steered. `scale`: units of
+/// the points in a metre.
+///
+/// # Errors
+/// When there would be too many.
+pub fn laid_fibres(
+    net: &Net<'_>,
+    (laid, scale): (&Laid, f64),
+    family: usize,
+    distance: f64,
+) -> Result<Vec<Fibre>, TooMany> {
+    match laid {
+        Laid::Straight(angles) => fibres(net, angles[family], distance),
+        Laid::Steered(_) => steered(net, (laid, scale), family, distance),
+    }
 }
 
 /// Lines of a family of steered fibres on a ply, `distance` apart where they cross the one through its middle. `scale`: units of the points in a metre.
 ///
 /// # Errors
 /// When there would be too many.
-pub fn steered(
+fn steered(
     net: &Net<'_>,
     (laid, scale): (&Laid, f64),
     family: usize,
@@ -306,7 +333,12 @@ pub fn steered(
 fn middles(net: &Net<'_>) -> Vec<Point> {
     let middle = |cell: &usize| {
         let corners = net.corners(*cell);
-        let sum = |d: usize| corners.iter().map(|i| net.flat[*i as usize][d]).sum::<f64>();
+        let sum = |d: usize| {
+            corners
+                .iter()
+                .map(|i| net.flat[*i as usize][d])
+                .sum::<f64>()
+        };
         [0, 1].map(|d| sum(d) / corners.len() as f64)
     };
     let mut all: Vec<Point> = net.through.iter().map(middle).collect();
@@ -359,11 +391,18 @@ mod tests {
             let node = |i: u32, j: u32| i * ROUND + j % ROUND;
             let cells = (0..ACROSS).flat_map(|i| {
                 (0..ROUND).flat_map(move |j| {
-                    [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)]
+                    [
+                        node(i, j),
+                        node(i + 1, j),
+                        node(i + 1, j + 1),
+                        node(i, j + 1),
+                    ]
                 })
             });
             let formed = flat.iter().map(|p| [p[0], p[1], 2.0 * p[0].hypot(p[1])]);
-            let points = flat.iter().map(|p| [p[0], p[1], p[1].atan2(p[0]) + FRAC_PI_2]);
+            let points = flat
+                .iter()
+                .map(|p| [p[0], p[1], p[1].atan2(p[0]) + FRAC_PI_2]);
             Self {
                 formed: formed.collect(),
                 cells: cells.collect(),
@@ -396,8 +435,16 @@ mod tests {
             let radius = |p: &Vec3| p[0].hypot(p[1]);
             let first = radius(&line.flat[0]);
             // A turn of it, 6.3 times the radius, by less than 1 % for each quarter.
-            assert!(line.flat.iter().all(|p| (radius(p) / first - 1.0).abs() < 0.04));
-            let length: f64 = line.flat.windows(2).map(|w| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1])).sum();
+            assert!(
+                line.flat
+                    .iter()
+                    .all(|p| (radius(p) / first - 1.0).abs() < 0.04)
+            );
+            let length: f64 = line
+                .flat
+                .windows(2)
+                .map(|w| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1]))
+                .sum();
             assert!(length < 6.5 * first, "it goes round more than once");
             for (flat, formed) in line.flat.iter().zip(&line.formed) {
                 // On the facets of the cone.

@@ -5,9 +5,10 @@
 mod drawing;
 
 use crate::boundary::loops;
+use crate::curves::laid_fibres;
 use crate::error::ExportError;
 use crate::file::File;
-use crate::net::{Net, TooMany, laid_fibres, rounded_up};
+use crate::net::{Net, TooMany, rounded_up};
 use crate::part::{Body, Part, Ply};
 use crate::request::Request;
 use crate::vec3::Vec3;

@@ -22,11 +22,11 @@ mod shells;
 mod vec3;
 mod vtu;
 
+pub use curves::{Field, laid_fibres, pieces};
 pub use error::ExportError;
 pub use fibres::{Sheared, deviations, sheared};
 pub use file::File;
-pub use curves::{Field, pieces};
-pub use net::{Fibre, Net, TooMany, fibres, laid_fibres};
+pub use net::{Fibre, Net, TooMany, fibres};
 pub use request::{Format, Frames, LengthUnit, Request};
 
 use part::Part;

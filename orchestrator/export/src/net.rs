@@ -1,9 +1,7 @@
 //! Lines of fibres: straight and at even distances in the flat ply, and where the formed ply carries them.
 
-use crate::curves;
 use crate::vec3::{Vec3, add_scaled, scaled};
 use plyflow_fixed::FixedBits;
-use plyflow_model::steering::Laid;
 use std::collections::BTreeMap;
 
 /// Most lines of a family in a ply: more than anybody looks at, and than a cutter draws.
@@ -48,23 +46,6 @@ pub struct TooMany {
     pub most: usize,
     /// A distance that does, to two digits.
     pub would: f64,
-}
-
-/// Lines of a family (0 or 1) as a ply was laid: straight ones as [`fibres`] has them, and curves where the fibres are steered. `scale`: units of
-/// the points in a metre.
-///
-/// # Errors
-/// When there would be too many.
-pub fn laid_fibres(
-    net: &Net<'_>,
-    (laid, scale): (&Laid, f64),
-    family: usize,
-    distance: f64,
-) -> Result<Vec<Fibre>, TooMany> {
-    match laid {
-        Laid::Straight(angles) => fibres(net, angles[family], distance),
-        Laid::Steered(_) => curves::steered(net, (laid, scale), family, distance),
-    }
 }
 
 /// Where a line crosses a side of the mesh.

@@ -311,26 +311,29 @@ fn add(
     });
 }
 
-/// The fields that follow from the shape of a ply. What the artifact does not tell is said, and no field of it is made.
-fn derive(body: &mut Body, number: usize, sheet: &Sheet, told: &mut Vec<String>) {
-    // A ply without fibres has an area all the same.
-    let laid = sheet.laid();
-    let fibres = laid.clone();
-    let fibres = fibres.unwrap_or(Laid::Straight([0.0, std::f64::consts::FRAC_PI_2]));
+/// The shapes of the cells of a ply. `laid`: `None` of one whose fibres are not told, which has an area all the same.
+fn shapes(body: &Body, laid: Option<&Laid>) -> Vec<Option<Sheared>> {
+    let any = Laid::Straight([0.0, std::f64::consts::FRAC_PI_2]);
+    let laid = laid.unwrap_or(&any);
     let of = |cell: usize| {
         let at = |points: &[Vec3]| -> Vec<Vec3> {
             let corners = body.corners(cell).iter();
             corners.map(|i| points[*i as usize]).collect()
         };
+        let flat = at(&body.flat);
         let shaped = body.shaped[cell];
         shaped
-            .then(|| {
-                let flat = at(&body.flat);
-                sheared(&flat, &at(&body.points), fibres.in_cell(&flat))
-            })
+            .then(|| sheared(&flat, &at(&body.points), laid.in_cell(&flat)))
             .flatten()
     };
-    let shapes: Vec<Option<Sheared>> = (0..body.count()).map(of).collect();
+    (0..body.count()).map(of).collect()
+}
+
+/// The fields that follow from the shape of a ply. What the artifact does not tell is said, and no field of it is made.
+fn derive(body: &mut Body, number: usize, sheet: &Sheet, told: &mut Vec<String>) {
+    // A ply without fibres has an area all the same.
+    let laid = sheet.laid();
+    let shapes = shapes(body, laid.as_ref());
     let over = |value: f64| -> Vec<f64> {
         let of = |s: &Option<Sheared>| s.map_or(f64::NAN, |s| value / s.area_ratio);
         shapes.iter().map(of).collect()

@@ -95,7 +95,9 @@ fn names_files(sheet: &Node) -> bool {
     let drawn = |c: &Node| c.get("drawing").is_some();
     let all = |key: &str| sheet.get(key).map_or(&[][..], Node::items).iter();
     sheet.get("plies").is_some()
-        || sheet.get("fibre_1").is_some_and(|f| f.get("table").is_some())
+        || sheet
+            .get("fibre_1")
+            .is_some_and(|f| f.get("table").is_some())
         || sheet.get("outline").is_some_and(drawn)
         || all("holes").any(drawn)
         || all("regions").any(|r| r.get("polygon").is_some_and(drawn))

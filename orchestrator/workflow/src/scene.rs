@@ -202,9 +202,7 @@ pub fn scene_value(
     if filled.as_ref().is_none_or(|f| f.sound) {
         scene_rules::tell(node, &materials, &found, at.source, resolver.problems);
     }
-    if straight_fibres {
-        steered(node, at, resolver.problems);
-    }
+    steered(node, at, straight_fibres, resolver.problems);
     if resolver.problems.count() > before {
         return None;
     }
@@ -238,7 +236,10 @@ pub fn scene_value(
 }
 
 /// Reports the plies whose fibres are steered, for a step that cannot do with them.
-fn steered(scene: &Node, at: &Place<'_>, problems: &mut Problems) {
+fn steered(scene: &Node, at: &Place<'_>, straight_fibres: bool, problems: &mut Problems) {
+    if !straight_fibres {
+        return;
+    }
     for sheet in scene.get("sheets").map_or(&[][..], Node::items) {
         let Some(fibres) = sheet.get("fibre_1") else {
             continue;
@@ -248,7 +249,9 @@ fn steered(scene: &Node, at: &Place<'_>, problems: &mut Problems) {
             let message =
                 format!("the fibres of ply `{name}` are steered, which this step cannot compute");
             let d = problems.add(at.source, &fibres.span, message);
-            d.expected("one direction for all of the ply, such as `fibre_1: 0 deg` with `fibre_2: 90 deg`");
+            d.expected(
+                "one direction for all of the ply, such as `fibre_1: 0 deg` with `fibre_2: 90 deg`",
+            );
             d.help("forming-explicit forms steered plies");
         }
     }

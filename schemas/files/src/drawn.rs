@@ -68,7 +68,8 @@ pub fn symbol(unit: Option<f64>) -> Result<Option<&'static str>, Flaw> {
                 si_text(metres, Dimension::Length)
             );
             let flaw = Flaw::whole(problem);
-            Err(flaw.expected("a unit that has a name, such as `1 mm`, or units in the table's head"))
+            Err(flaw
+                .expected("a unit that has a name, such as `1 mm`, or units in the table's head"))
         }
     });
     symbol.transpose()

@@ -80,7 +80,8 @@ mod tests {
 
     #[test]
     fn points_are_read_with_units_as_people_write_them() {
-        let text = "# placed on machine 2\nx [mm];y [mm];angle;note\n0;0;0;start\n12,5;-3 cm;0,5 rad;\n";
+        let text =
+            "# placed on machine 2\nx [mm];y [mm];angle;note\n0;0;0;start\n12,5;-3 cm;0,5 rad;\n";
         let rows = read(text, None).unwrap_or_else(|e| panic!("{e:?}"));
         let all: Vec<[f64; 3]> = rows
             .iter()
@@ -97,16 +98,31 @@ mod tests {
     #[test]
     fn what_is_no_table_of_directions_is_told_where_it_stands() {
         for (text, says) in [
-            ("x,y,angle\n1,2,3\n", "t.csv:2:1: `x` is `1`, without a unit"),
-            ("x [mm],y [mm]\n1,2\n", "t.csv:1:1: the head has no column angle"),
-            ("x [mm],y [mm],angle\n1,,3\n", "t.csv:2:1: the point has no `y`"),
+            (
+                "x,y,angle\n1,2,3\n",
+                "t.csv:2:1: `x` is `1`, without a unit",
+            ),
+            (
+                "x [mm],y [mm]\n1,2\n",
+                "t.csv:1:1: the head has no column angle",
+            ),
+            (
+                "x [mm],y [mm],angle\n1,,3\n",
+                "t.csv:2:1: the point has no `y`",
+            ),
             (
                 "x [mm],y [mm],angle\n1,2,steep\n",
                 "t.csv:2:5: `angle` is `steep`, which is no angle",
             ),
-            ("x [mm],y [mm],angle [mm]\n1,2,3\n", "t.csv:1:15: the unit of `angle`"),
+            (
+                "x [mm],y [mm],angle [mm]\n1,2,3\n",
+                "t.csv:1:15: the unit of `angle`",
+            ),
             ("x [mm],y [mm],angle\n", "t.csv:1:1: the table has no point"),
-            ("x [mm],y [mm],angel\n1,2,3\n", "t.csv:1:15: there is no column `angel`"),
+            (
+                "x [mm],y [mm],angel\n1,2,3\n",
+                "t.csv:1:15: there is no column `angel`",
+            ),
         ] {
             let flaws = read(text, None).unwrap_err();
             let told = flaws[0].of("t.csv", text);

@@ -19,9 +19,11 @@ pub use crate::process::{
     DoubleDiaphragm, Hold, Holder, Press, PressPlate, PressureAt, PressureCourse, PressureTable,
     Process, Towards, WeightDirection,
 };
-pub use crate::steering::{FibreDirection, Laid, SteeredPoint, Steering, SteeringError, SteeringTable};
 pub use crate::stamping::{
     ForceCourse, Gripper, MatchingDie, PartMotion, Pressed, Side, Stamping, StampingPart, Vertical,
+};
+pub use crate::steering::{
+    FibreDirection, Laid, SteeredPoint, Steering, SteeringError, SteeringTable, first_axis,
 };
 pub use crate::tool::{
     DoubleDomeTool, FlatTool, GivenSurface, HemisphereTool, InputTool, Joggle, JoggleSpar,
@@ -252,22 +254,4 @@ pub enum Families {
     Kept,
     /// They are each other's; shear keeps its sign.
     Exchanged,
-}
-
-/// Direction (rad, from x) of the first axis of a ply whose fibre families lie at `fibre_1` and `fibre_2` (rad): that of the family
-/// which the other follows counter-clockwise, so that the stitch lies between the first axis and the second. Elements and their
-/// membrane forces have these axes, whichever way round the scene names the families.
-///
-/// ```
-/// use plyflow_model::scene::first_axis;
-/// let deg = f64::to_radians;
-/// assert_eq!(first_axis(deg(-45.0), deg(45.0)), deg(-45.0));
-/// assert_eq!(first_axis(deg(45.0), deg(-45.0)), deg(-45.0));
-/// ```
-pub fn first_axis(fibre_1: f64, fibre_2: f64) -> f64 {
-    if (fibre_2 - fibre_1).fixed_sin() >= 0.0 {
-        fibre_1
-    } else {
-        fibre_2
-    }
 }

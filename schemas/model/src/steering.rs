@@ -6,7 +6,6 @@
 //! **The second family** lies a quarter turn counter-clockwise of the first at each place.
 
 use crate::outline::{Millimetres, Point, Region, cross, segment_distance, sides};
-use crate::scene::first_axis;
 use crate::units::{Angle, Length};
 use plyflow_fixed::FixedBits;
 use schemars::JsonSchema;
@@ -306,7 +305,8 @@ impl SteeredField {
     fn holds(&self, [x, y]: Point) -> bool {
         !matches!(
             self.triangles.locate(Point2::new(x, y)),
-            PositionInTriangulation::OutsideOfConvexHull(_) | PositionInTriangulation::NoTriangulation
+            PositionInTriangulation::OutsideOfConvexHull(_)
+                | PositionInTriangulation::NoTriangulation
         )
     }
 }
@@ -353,6 +353,24 @@ fn same_place(points: &[[f64; 3]], order: &[usize]) -> Result<(), SteeringError>
         }
     }
     Ok(())
+}
+
+/// Direction (rad, from x) of the first axis of a ply whose fibre families lie at `fibre_1` and `fibre_2` (rad): that of the family
+/// which the other follows counter-clockwise, so that the stitch lies between the first axis and the second. Elements and their
+/// membrane forces have these axes, whichever way round the scene names the families.
+///
+/// ```
+/// use plyflow_model::scene::first_axis;
+/// let deg = f64::to_radians;
+/// assert_eq!(first_axis(deg(-45.0), deg(45.0)), deg(-45.0));
+/// assert_eq!(first_axis(deg(45.0), deg(-45.0)), deg(-45.0));
+/// ```
+pub fn first_axis(fibre_1: f64, fibre_2: f64) -> f64 {
+    if (fibre_2 - fibre_1).fixed_sin() >= 0.0 {
+        fibre_1
+    } else {
+        fibre_2
+    }
 }
 
 /// Directions of both fibre families of a flat ply.

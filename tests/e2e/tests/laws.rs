@@ -194,7 +194,12 @@ fn curves_of_compressed_fibres_are_the_stresses_of_the_law_by_family() {
                     let mut metric = [1.0, 1.0, 0.0];
                     metric[family] = stretch * stretch;
                     let stress = Point::new(&law).at(&law, metric).stress[family] * stretch;
-                    is_close(-1e-6 * stress / 3e-4, *y, 5.0, &format!("{} at {x} %", curve.name));
+                    is_close(
+                        -1e-6 * stress / 3e-4,
+                        *y,
+                        5.0,
+                        &format!("{} at {x} %", curve.name),
+                    );
                 }
             }
         }

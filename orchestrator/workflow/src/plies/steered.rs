@@ -2,10 +2,10 @@
 
 use super::{Filler, entry_mut, list, moved, text};
 use crate::yaml::{Entry, Kind, Node};
+use plyflow_files::drawn;
 use plyflow_files::flaw::Flaw;
 use plyflow_files::open::MOST_WRITTEN;
 use plyflow_files::steered::{self, Row};
-use plyflow_files::drawn;
 use plyflow_model::steering::SteeringTable;
 use plyflow_model::units::Length;
 

@@ -67,9 +67,7 @@ fn no_field(error: SteeringError, at: &Path) -> Fault {
                 " already)",
             ))
         }
-        SteeringError::NoNumber(k) => {
-            Fault::text(Rule::Fibres, points.item(k), error.to_string())
-        }
+        SteeringError::NoNumber(k) => Fault::text(Rule::Fibres, points.item(k), error.to_string()),
         SteeringError::Count(_) => Fault::text(Rule::Fibres, points, error.to_string()),
         SteeringError::NotRead(_) => {
             Fault::text(Rule::Fibres, at.key("table").key("file"), error.to_string())

@@ -131,13 +131,24 @@ fn points_that_tell_no_direction_are_refused() {
         refused(&vec![[0.0; 3]; MOST_POINTS + 1]),
         SteeringError::Count(MOST_POINTS + 1)
     );
-    assert_eq!(refused(&[[0.0; 3], [f64::NAN, 0.0, 0.0]]), SteeringError::NoNumber(1));
+    assert_eq!(
+        refused(&[[0.0; 3], [f64::NAN, 0.0, 0.0]]),
+        SteeringError::NoNumber(1)
+    );
     let twice = [[0.1, 0.2, 0.0], [0.0, 0.0, 0.0], [0.1, 0.2, 1.0]];
-    let SteeringError::Same { first: 0, second: 2, .. } = refused(&twice) else {
+    let SteeringError::Same {
+        first: 0,
+        second: 2,
+        ..
+    } = refused(&twice)
+    else {
         panic!("{:?}", refused(&twice));
     };
     // The smallest numbers are places, too.
-    assert_eq!(field(&[[1e-300, 0.0, 0.1], [1.0, 0.0, 0.1]]).angle_at([0.5, 0.0]), 0.1);
+    assert_eq!(
+        field(&[[1e-300, 0.0, 0.1], [1.0, 0.0, 0.1]]).angle_at([0.5, 0.0]),
+        0.1
+    );
 }
 
 #[test]
@@ -153,7 +164,9 @@ fn a_sharp_turn_is_told_where_the_ply_lies_and_not_in_its_hole() {
     let field = field(&points);
     let circle = |r: f64| -> Vec<Point> {
         let turn = |k: i32| TAU * f64::from(k) / 60.0;
-        (0..60).map(|k| [r * turn(k).cos(), r * turn(k).sin()]).collect()
+        (0..60)
+            .map(|k| [r * turn(k).cos(), r * turn(k).sin()])
+            .collect()
     };
     let ring = Region::new(circle(0.19), vec![circle(0.1)]).unwrap();
     assert_eq!(field.sharp_turn(Some(&ring)), None);
@@ -170,11 +183,22 @@ fn a_sharp_turn_is_told_where_the_ply_lies_and_not_in_its_hole() {
 #[test]
 fn a_straight_ply_keeps_its_directions_and_a_steered_one_lies_square() {
     let straight = Laid::Straight([0.3, 0.9]);
-    assert_eq!((straight.at([1.0, 2.0]), straight.axis_at([1.0, 2.0])), ([0.3, 0.9], 0.3));
+    assert_eq!(
+        (straight.at([1.0, 2.0]), straight.axis_at([1.0, 2.0])),
+        ([0.3, 0.9], 0.3)
+    );
     let steered = Laid::steered(vec![[0.0, 0.0, 0.1], [1.0, 0.0, 0.3]]).unwrap();
-    let corners = [[0.0, 0.0, 9.0], [1.0, 0.0, 9.0], [1.0, 1.0, 9.0], [0.0, 1.0, 9.0]];
+    let corners = [
+        [0.0, 0.0, 9.0],
+        [1.0, 0.0, 9.0],
+        [1.0, 1.0, 9.0],
+        [0.0, 1.0, 9.0],
+    ];
     let [first, second] = steered.in_cell(&corners);
     assert!((first - 0.2).abs() < 1e-12 && second == first + FRAC_PI_2);
     assert_eq!(steered.axis_in_cell(&corners), first);
-    assert_eq!((straight.straight(), steered.straight()), (Some([0.3, 0.9]), None));
+    assert_eq!(
+        (straight.straight(), steered.straight()),
+        (Some([0.3, 0.9]), None)
+    );
 }

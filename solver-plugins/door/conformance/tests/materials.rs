@@ -2,7 +2,9 @@
 
 mod common;
 
-use common::{CRUSHED, FILM, ISOTROPIC, KINKED, LINEAR, TABULATED_FILM, WOVEN, ncf, of_material, sound};
+use common::{
+    CRUSHED, FILM, ISOTROPIC, KINKED, LINEAR, TABULATED_FILM, WOVEN, ncf, of_material, sound,
+};
 use plyflow_conformance::{Check, failed};
 use plyflow_kernels::fabric::Fabric;
 use plyflow_kernels::fabric_linear::FabricLinear;

@@ -94,7 +94,9 @@ pub fn find_causes(
         let flat = |&i: &u32| [0, 1].map(|k| ply.undeformed[i as usize][k]);
         others.iter().any(|other| {
             let askew = |p: &[f64; 2]| {
-                laid.is_some_and(|own| relative_angle(own.at(*p), other.laid.at(*p)) > limits.layup_angle)
+                laid.is_some_and(|own| {
+                    relative_angle(own.at(*p), other.laid.at(*p)) > limits.layup_angle
+                })
             };
             let places: Vec<[f64; 2]> = ridge.iter().map(flat).filter(askew).collect();
             !places.is_empty() && lies_at(other.ply, &places)

@@ -41,7 +41,10 @@ fn a_point_has_the_stress_of_the_curve_in_both_families_and_that_of_the_modulus_
         }
         // Beyond the last point along the tangent there: a straight line, that rises and does not rise faster than the last chord.
         let beyond = [0.06, 0.1, 0.3].map(|e| (-stress(e) - 5.2e6) / (e - 0.05));
-        assert!((beyond[0] / beyond[2] - 1.0).abs() < 1e-9 && (beyond[1] / beyond[2] - 1.0).abs() < 1e-9);
+        assert!(
+            (beyond[0] / beyond[2] - 1.0).abs() < 1e-9
+                && (beyond[1] / beyond[2] - 1.0).abs() < 1e-9
+        );
         assert!((0.0..=5e6).contains(&beyond[0]), "{beyond:?}");
         for e in [1e-4, 0.01] {
             assert!((stress(-e) / (MODULUS * e) - 1.0).abs() < 1e-9);
@@ -57,7 +60,12 @@ fn an_element_that_is_pressed_together_carries_the_force_of_the_curve() {
     let m = build(&crushed(false));
     let e = El::new::<M4>("{}", &m).unwrap();
     let (length, width) = (0.02, 0.01);
-    let corners = [[0.0, 0.0, 0.0], [length, 0.0, 0.0], [length, width, 0.0], [0.0, width, 0.0]];
+    let corners = [
+        [0.0, 0.0, 0.0],
+        [length, 0.0, 0.0],
+        [length, width, 0.0],
+        [0.0, width, 0.0],
+    ];
     let mut batch = e.initialise(&[corners; 8], &[[1.0, 0.0, 0.0]; 8]);
     for (strain, stress) in STRAINS.iter().zip(STRESSES).skip(1) {
         let moved = corners.map(|[x, y, z]| [x * (1.0 - strain), y, z]);
@@ -65,7 +73,10 @@ fn an_element_that_is_pressed_together_carries_the_force_of_the_curve() {
         let right: f64 = [1, 2].iter().map(|k| f.force[3 * k * 8]).sum();
         let wanted = stress * THICKNESS * width;
         // What an element gives is the force on its nodes from inside, or the one that it resists with: by size.
-        assert!((right.abs() / wanted - 1.0).abs() < 1e-9, "{right} N, {wanted} N at {strain}");
+        assert!(
+            (right.abs() / wanted - 1.0).abs() < 1e-9,
+            "{right} N, {wanted} N at {strain}"
+        );
     }
 }
 
@@ -99,7 +110,11 @@ fn the_energy_is_the_integral_of_the_stress() {
             };
             let d = (moved(1.0).energy - moved(-1.0).energy) / 2e-6;
             let s = if k < 2 { 2.0 * d } else { d };
-            assert!((s - a.stress[k]).abs() < 1e-4 * size, "{c:?}: {s} {:?}", a.stress);
+            assert!(
+                (s - a.stress[k]).abs() < 1e-4 * size,
+                "{c:?}: {s} {:?}",
+                a.stress
+            );
         }
     }
 }
@@ -114,7 +129,11 @@ fn no_tangent_is_larger_than_its_bound() {
         let m = build(&ply);
         let mut r = Random(7);
         for _ in 0..2000 {
-            let c = metric(1.0 - 0.04 * r.next().abs(), 1.0 + 0.04 * r.next(), 0.5 * r.next());
+            let c = metric(
+                1.0 - 0.04 * r.next().abs(),
+                1.0 + 0.04 * r.next(),
+                0.5 * r.next(),
+            );
             let p = Point::new(&m);
             let bound = p.peek(&m, c).stiffness[0];
             for k in 0..3 {
@@ -148,10 +167,15 @@ fn families_may_differ_and_a_straight_curve_is_a_share_of_the_modulus() {
     assert!((of(a.stress[0], 0.99) / (-MODULUS * 0.01) - 1.0).abs() < 1e-9);
     assert!((of(a.stress[1], 0.99) / -5e6 - 1.0).abs() < 1e-9);
     // All the same law, by either way.
-    let mut factor = sheet("fibre-energy", &json!({"coefficients": NCF_YARN}), Some(stitch("positive")));
+    let mut factor = sheet(
+        "fibre-energy",
+        &json!({"coefficients": NCF_YARN}),
+        Some(stitch("positive")),
+    );
     let mut straight = factor.clone();
     factor["compression_factor"] = json!(0.1);
-    straight["compression"] = json!({"table": {"strains": [0.0, 0.02], "stresses": [0.0, 0.02 * 0.1 * MODULUS]}});
+    straight["compression"] =
+        json!({"table": {"strains": [0.0, 0.02], "stresses": [0.0, 0.02 * 0.1 * MODULUS]}});
     let (a, b) = (build(&factor), build(&straight));
     let mut r = Random(9);
     let (mut p, mut q) = (Point::new(&a), Point::new(&b));
@@ -169,31 +193,51 @@ fn families_may_differ_and_a_straight_curve_is_a_share_of_the_modulus() {
 fn curves_that_are_none_are_refused_by_name() {
     let table = |strains: Value, stresses: Value| json!({"table": {"strains": strains, "stresses": stresses}});
     let cases: [(Value, &str); 9] = [
-        (json!({"compression": curve(), "compression_factor": 1.0}), "compression: given together with 'compression_factor'"),
+        (
+            json!({"compression": curve(), "compression_factor": 1.0}),
+            "compression: given together with 'compression_factor'",
+        ),
         (
             json!({"compression_2": curve(), "compression_factor_2": 0.2}),
             "compression_2: given together with 'compression_factor_2'",
         ),
-        (json!({"compression": curve(), "form": "hypoelastic"}), "expected form 'fibre-energy'"),
-        (json!({"compression": curve(), "fibre_modulus_2": 6e6}), "compression_2: not given, and family 2 has a modulus of its own"),
+        (
+            json!({"compression": curve(), "form": "hypoelastic"}),
+            "expected form 'fibre-energy'",
+        ),
+        (
+            json!({"compression": curve(), "fibre_modulus_2": 6e6}),
+            "compression_2: not given, and family 2 has a modulus of its own",
+        ),
         (
             json!({"compression": table(json!([0.0, 0.1, 0.2]), json!([0.0, 3e6, 2e6]))}),
             "compression.table.stresses[2]: given 2000000 Pa at 0.2 (20 %) after 3000000 Pa; expected stresses that do not fall",
         ),
-        (json!({"compression": table(json!([0.0, 0.1]), json!([0.0, 0.0]))}), "compression.table.stresses[1]: given 0 Pa"),
+        (
+            json!({"compression": table(json!([0.0, 0.1]), json!([0.0, 0.0]))}),
+            "compression.table.stresses[1]: given 0 Pa",
+        ),
         (
             json!({"compression": table(json!([0.0, 0.1]), json!([0.0, 4e8]))}),
             "compression.table.stresses[1]: given 400000000 Pa at 0.1 (10 %), which rises by 4000000000 Pa for each strain; expected at most the modulus",
         ),
-        (json!({"compression": table(json!([0.0, 2.0]), json!([0.0, 5e6]))}), "compression.table.strains[1]: given 2 (200 %); expected less than 1"),
-        (json!({"compression": table(json!([0.01, 0.1]), json!([0.0, 5e6]))}), "as first point; expected 0 and 0"),
+        (
+            json!({"compression": table(json!([0.0, 2.0]), json!([0.0, 5e6]))}),
+            "compression.table.strains[1]: given 2 (200 %); expected less than 1",
+        ),
+        (
+            json!({"compression": table(json!([0.01, 0.1]), json!([0.0, 5e6]))}),
+            "as first point; expected 0 and 0",
+        ),
     ];
     for (more, says) in cases {
         let mut ply = sheet("fibre-energy", &json!({"coefficients": NCF_YARN}), None);
         for (key, value) in more.as_object().unwrap() {
             ply[key] = value.clone();
         }
-        let error = fabric(&ply.to_string()).err().unwrap_or_else(|| panic!("{says}: taken"));
+        let error = fabric(&ply.to_string())
+            .err()
+            .unwrap_or_else(|| panic!("{says}: taken"));
         assert!(error.contains(says), "{error}");
     }
 }

@@ -93,11 +93,6 @@ pub struct SteeredAxes {
 }
 
 impl SheetSpec {
-    /// Direction of e1 in a cell.
-    pub(crate) fn axis_of_cell(&self, cell: usize) -> [f64; 3] {
-        self.steered.as_ref().map_or(self.axis, |s| s.cells[cell])
-    }
-
     /// Direction of e1 of the patch around a mesh-local node.
     pub(crate) fn axis_of_patch(&self, centre: u32) -> [f64; 3] {
         let of = |s: &SteeredAxes| s.nodes[centre as usize];

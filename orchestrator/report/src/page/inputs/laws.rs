@@ -81,15 +81,15 @@ fn constants(with: &Value) -> Vec<(&'static str, String)> {
         })
     };
     // Where nothing is said of it, fibres are as stiff as in tension.
-    let plain = ["compression", "compression_2"].iter().all(|k| with[*k].is_null());
-    let share = of("compression_factor").or((plain && of("fibre_modulus").is_some()).then_some(1.0));
+    let plain = ["compression", "compression_2"]
+        .iter()
+        .all(|k| with[*k].is_null());
+    let share =
+        of("compression_factor").or((plain && of("fibre_modulus").is_some()).then_some(1.0));
     let all = [
         ("Modulus along the fibres", modulus("fibre_modulus")),
         ("Modulus of the second family", modulus("fibre_modulus_2")),
-        (
-            "Share of it in compression",
-            share.map(|v| number(v, 4)),
-        ),
+        ("Share of it in compression", share.map(|v| number(v, 4))),
         ("Young's modulus", modulus("youngs_modulus")),
     ];
     all.into_iter()

@@ -53,7 +53,13 @@ pub(super) fn sketches(sheets: &[Sheet]) -> Markup {
         let alike = |(s, _): &&mut (&Sheet, Vec<&str>)| {
             let flat = |s: &Sheet| (s.fibre_1, s.fibre_2);
             (&s.outline, &s.holes, &s.regions, &s.steering, flat(s))
-                == (&sheet.outline, &sheet.holes, &sheet.regions, &sheet.steering, flat(sheet))
+                == (
+                    &sheet.outline,
+                    &sheet.holes,
+                    &sheet.regions,
+                    &sheet.steering,
+                    flat(sheet),
+                )
         };
         match all.iter_mut().find(alike) {
             Some((_, names)) => names.push(&sheet.name),
@@ -203,5 +209,71 @@ fn dimensions([left, top, w, h]: [f64; 4], b: [f64; 4]) -> Markup {
         path class="axis" d={ "M" (px(x - 4.0)) " " (px(top)) "h8M" (px(x - 4.0)) " " (px(top + h)) "h8M" (px(x)) " " (px(top)) "v" (px(h)) } {}
         text class="tick" x=(px(x - 8.0)) y=(px(middle)) text-anchor="middle" transform={ "rotate(-90 " (px(x - 8.0)) " " (px(middle)) ")" } {
             (mm(b[3] - b[1])) " (y " (mm(b[1])) " … " (mm(b[3])) ")" }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plyflow_model::scene::SheetKind;
+
+    /// A ply of 200 x 100 mm with a hole, whose fibres lie on circles about (-0.15, 0) m.
+    fn steered() -> Sheet {
+        let corner = |x: f64, y: f64| [0.1 * x, 0.05 * y];
+        let at = |k: i32| f64::from(k) * 0.01;
+        let places = (-11..=11).flat_map(|i| (-6..=6).map(move |j| [at(i), at(j)]));
+        let across = std::f64::consts::FRAC_PI_2;
+        let points = places.map(|[x, y]| [x, y, y.atan2(x + 0.15) + across]);
+        Sheet {
+            outline: Some(vec![
+                corner(-1.0, -1.0),
+                corner(1.0, -1.0),
+                corner(1.0, 1.0),
+                corner(-1.0, 1.0),
+            ]),
+            holes: vec![vec![[0.0, 0.0], [0.0, 0.02], [0.02, 0.02], [0.02, 0.0]]],
+            steering: Some(points.collect()),
+            ..Sheet::new("ply_1", SheetKind::Ply, 4e-4, 2e-4)
+        }
+    }
+
+    #[test]
+    fn curves_of_a_steered_ply_follow_its_fibres_and_stay_on_it() {
+        let sheet = steered();
+        let laid = sheet.laid().unwrap();
+        for family in 0..2 {
+            let lines = curves(&sheet, &laid, family);
+            assert!(lines.len() > 5, "{}", lines.len());
+            for line in &lines {
+                let polar = |p: &Point| [(p[0] + 0.15).hypot(p[1]), p[1].atan2(p[0] + 0.15)];
+                let tolerance = [0.02 * polar(&line[0])[0], 0.02][family];
+                for p in line {
+                    assert!(p[0].abs() < 0.1 + 1e-9 && p[1].abs() < 0.05 + 1e-9, "{p:?}");
+                    let in_hole = [0, 1].iter().all(|d| (1e-6..0.02 - 1e-6).contains(&p[*d]));
+                    assert!(!in_hole, "{p:?}");
+                    // On a circle the radius stays, on a ray the angle.
+                    let off = polar(p)[family] - polar(&line[0])[family];
+                    assert!(off.abs() < tolerance, "family {family}: {off}");
+                }
+            }
+        }
+        let drawn = sketches(&[
+            sheet.clone(),
+            Sheet {
+                name: "ply_2".into(),
+                ..sheet
+            },
+        ])
+        .into_string();
+        assert!(drawn.contains("line c0") && drawn.contains("line c1"));
+        assert!(
+            drawn.contains("ply_1, ply_2"),
+            "alike in all, and drawn once"
+        );
+        let mut other = steered();
+        other.steering.as_mut().unwrap()[0][2] += 0.1;
+        other.name = "ply_2".into();
+        let drawn = sketches(&[steered(), other]).into_string();
+        assert!(!drawn.contains("ply_1, ply_2"));
     }
 }

@@ -121,7 +121,11 @@ impl Cubic {
             let at = |t: f64| c1 + t * (2.0 * c2 + 3.0 * c3 * t);
             // A slope is a parabola of the place.
             let top = -c2 / (3.0 * c3);
-            let top = if top > 0.0 && top < h { at(top) } else { at(0.0) };
+            let top = if top > 0.0 && top < h {
+                at(top)
+            } else {
+                at(0.0)
+            };
             at(0.0).max(at(h)).max(top)
         });
         within.fold(self.end_slope, f64::max)
@@ -254,8 +258,14 @@ mod tests {
             let places = (0..=100_000).map(|i| c.end * f64::from(i) / 100_000.0);
             let largest = places.map(|t| at(&c, t).1).fold(0.0, f64::max);
             let steepest = c.steepest();
-            assert!(largest <= steepest * (1.0 + 1e-12), "{n}: {largest} {steepest}");
-            assert!(largest > steepest * (1.0 - 1e-3), "{n}: {largest} {steepest}");
+            assert!(
+                largest <= steepest * (1.0 + 1e-12),
+                "{n}: {largest} {steepest}"
+            );
+            assert!(
+                largest > steepest * (1.0 - 1e-3),
+                "{n}: {largest} {steepest}"
+            );
         }
     }
 

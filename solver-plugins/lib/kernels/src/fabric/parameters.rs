@@ -186,7 +186,9 @@ impl Parameters {
             compression: [0, 1].map(|family| tension[family] * pushed.factors[family]),
             stiffest: [0, 1].map(|family| {
                 let crush = pushed.crush.as_ref();
-                crush.map_or(tension[family], |c| c[family].steepest().max(tension[family]))
+                crush.map_or(tension[family], |c| {
+                    c[family].steepest().max(tension[family])
+                })
             }),
             crush: pushed.crush,
             shear,
@@ -204,64 +206,73 @@ struct Pushed {
 }
 
 impl Parameters {
-    /// What fibres with these moduli in tension (Pa) do in compression. A family without words of its own follows the first one.
-    fn pushed(&self, moduli: [f64; 2]) -> Result<Pushed, String> {
-        let given = [
-            ("compression", self.compression_factor, &self.compression),
-            ("compression_2", self.compression_factor_2, &self.compression_2),
-        ];
-        for (name, factor, curve) in &given {
-            let of_factor = name.replace("compression", "compression_factor");
+    /// Whether what is said of compression goes together.
+    fn check_compression(&self) -> Result<(), String> {
+        let curves = [&self.compression, &self.compression_2];
+        let factors = [self.compression_factor, self.compression_factor_2];
+        for (k, (curve, factor)) in curves.iter().zip(factors).enumerate() {
+            let family = ["", "_2"][k];
             if let Some(factor) = factor.filter(|f| !(0.0..=1.0).contains(f)) {
-                return Err(format!("{of_factor}: given {factor}; expected 0 to 1"));
+                return Err(format!(
+                    "compression_factor{family}: given {factor}; expected 0 to 1"
+                ));
             }
             if factor.is_some() && curve.is_some() {
                 return Err(format!(
-                    "{name}: given together with '{of_factor}'; expected one of them: a curve, or a share of the modulus"
+                    "compression{family}: given together with 'compression_factor{family}'; expected one of them: a curve, or a share of the modulus"
                 ));
             }
         }
-        let [(_, factor, curve), (_, factor_2, curve_2)] = given;
-        let first = factor.unwrap_or(1.0);
-        if curve.is_none() && curve_2.is_none() {
-            let factors = [first, factor_2.unwrap_or(first)];
-            return Ok(Pushed { factors, crush: None });
+        let [first, second] = curves.map(Option::is_some);
+        if (first || second) && self.form == Form::Hypoelastic {
+            return Err("compression: given with form 'hypoelastic', which adds increments of one modulus; expected form 'fibre-energy', or \
+                        'compression_factor'"
+                .into());
         }
-        if self.form == Form::Hypoelastic {
-            return Err(
-                "compression: given with form 'hypoelastic', which adds increments of one modulus; expected form 'fibre-energy', or \
-                 'compression_factor'"
-                    .into(),
-            );
+        let second = second || self.compression_factor_2.is_some();
+        if first && !second && self.fibre_modulus_2.is_some() {
+            return Err("compression_2: not given, and family 2 has a modulus of its own; expected 'compression_2' or 'compression_factor_2': stresses of \
+                        the one family are not those of the other"
+                .into());
         }
-        if self.fibre_modulus_2.is_some() && factor_2.is_none() && curve_2.is_none() {
-            return Err(
-                "compression_2: not given, and family 2 has a modulus of its own; expected 'compression_2' or 'compression_factor_2': stresses of the \
-                 one family are not those of the other"
-                    .into(),
-            );
+        Ok(())
+    }
+
+    /// What fibres with these moduli in tension (Pa) do in compression. A family without words of its own follows the first one.
+    fn pushed(&self, moduli: [f64; 2]) -> Result<Pushed, String> {
+        self.check_compression()?;
+        let first = self.compression_factor.unwrap_or(1.0);
+        let factors = [first, self.compression_factor_2.unwrap_or(first)];
+        if self.compression.is_none() && self.compression_2.is_none() {
+            return Ok(Pushed {
+                factors,
+                crush: None,
+            });
         }
-        // A share of the modulus is a straight curve, so that both families have one kernel. One without any stiffness stays so.
         let h = self.thickness;
-        let straight = |modulus: f64, factor: f64| Crush::new(&[0.0, 0.5], &[0.0, 0.5 * factor * modulus * h]);
-        let curved = |name: &str, table: &CompressionTable, modulus: f64| {
-            let (strains, stresses) = (&table.strains, &table.stresses);
+        // A share of the modulus is a straight curve, so that both families have one kernel. One without any stiffness stays so.
+        let straight = |family: usize| {
+            let slope = factors[family] * moduli[family] * h;
+            Crush::new(&[0.0, 0.5], &[0.0, 0.5 * slope])
+        };
+        let curved = |name: &str, c: &CompressionParameters, modulus: f64| {
+            let (strains, stresses) = (&c.table.strains, &c.table.stresses);
             checks::compression_table(&format!("{name}.table"), strains, stresses, modulus)?;
             let forces: Vec<f64> = stresses.iter().map(|s| s * h).collect();
             Ok::<_, String>(Crush::new(strains, &forces))
         };
-        let crush_1 = match curve {
-            Some(c) => curved("compression", &c.table, moduli[0])?,
-            None => straight(moduli[0], first),
+        let crush_1 = match &self.compression {
+            Some(c) => curved("compression", c, moduli[0])?,
+            None => straight(0),
         };
-        let crush_2 = match (curve_2, factor_2, curve) {
-            (Some(c), _, _) => curved("compression_2", &c.table, moduli[1])?,
-            (None, Some(factor), _) => straight(moduli[1], factor),
-            (None, None, Some(_)) => crush_1.clone(),
-            (None, None, None) => straight(moduli[1], first),
+        let follows = self.compression.is_some() && self.compression_factor_2.is_none();
+        let crush_2 = match &self.compression_2 {
+            Some(c) => curved("compression_2", c, moduli[1])?,
+            None if follows => crush_1.clone(),
+            None => straight(1),
         };
         Ok(Pushed {
-            factors: [first, factor_2.unwrap_or(first)],
+            factors,
             crush: Some([crush_1, crush_2]),
         })
     }

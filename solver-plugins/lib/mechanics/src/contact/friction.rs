@@ -331,6 +331,22 @@ mod tests {
     }
 
     #[test]
+    fn a_fibre_has_no_sense_where_the_cells_about_a_node_name_opposite_ones() {
+        let mesh = QuadMesh::grid(&[0.0, 0.01, 0.02], &[0.0, 0.01, 0.02]);
+        let along = |angle: f64| [angle.cos(), angle.sin(), 0.0];
+        // By cell about the node in the middle: steered fibres near 90 degrees are told as 85 or as -85.
+        let angles = [85.0, -85.0, 88.0, -88.0f64].map(f64::to_radians);
+        let of = |turn: f64| {
+            let each = |c: usize| along(angles[c] + if c % 2 == 1 { turn } else { 0.0 });
+            let field = FibreField::steered(&mesh.cells, 0, &mesh.points, each);
+            unit(field.at_node(4, &mesh.points))
+        };
+        let [a, b] = [of(0.0), of(std::f64::consts::PI)];
+        assert!(norm(sub(a, [0.0, 1.0, 0.0])) < 0.01, "{a:?}");
+        assert!(norm(sub(a, b)) < 1e-12, "{a:?} {b:?}");
+    }
+
+    #[test]
     fn fibres_and_areas_follow_a_sheet_that_is_sheared_and_turned_out_of_its_plane() {
         let mesh = QuadMesh::grid(&[0.0, 0.01, 0.025], &[0.0, 0.02, 0.03]);
         let start = [0.6f64.cos(), 0.6f64.sin(), 0.0];

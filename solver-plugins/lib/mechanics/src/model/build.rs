@@ -135,11 +135,8 @@ impl Model {
             self.add_patches(sheet_index, &spec, material.bending_history)?;
         }
         self.topology.cells.extend(cells);
-        let axes: Vec<Vec3> = match &spec.steered {
-            Some(_) => (0..spec.cells.len()).map(|c| spec.axis_of_cell(c)).collect(),
-            None => Vec::new(),
-        };
-        let axis = |cell: u32| axes.get(cell as usize).copied().unwrap_or(spec.axis);
+        let (straight, steered) = (spec.axis, spec.steered);
+        let axis = |c: u32| steered.as_ref().map_or(straight, |s| s.cells[c as usize]);
         let mut sheet = Sheet {
             name: spec.name,
             nodes: self.topology.mirroring.own(spec.nodes),

@@ -190,7 +190,13 @@ mod tests {
             .unwrap()
             .unwrap();
         let driven = grid.driven_nodes();
-        let pull = Pull::new(&grid, &driven, &coarse.points, cells, Laid::Straight([0.0, 1.0]));
+        let pull = Pull::new(
+            &grid,
+            &driven,
+            &coarse.points,
+            cells,
+            Laid::Straight([0.0, 1.0]),
+        );
         let forces = [500.0, 0.0, 0.0].map(|v| vec![v; coarse.cells.len()]);
         let all = pull.forces(&coarse.points, &forces);
         let sum = all.iter().fold([0.0; 3], |s, f| add(s, *f));

@@ -147,7 +147,11 @@ fn fits(scene: &Scene, boundary: &Boundary, step: &str) -> Result<()> {
         let [fibre_1, fibre_2] = [0, 1].map(|k| laid.map(|fibres| fibres[k]));
         steered_alike(sheet, told).or_else(|there_here| {
             let [there, here] = there_here;
-            differs(&format!("the direction of the fibres of sheet '{name}'"), &there, &here)
+            differs(
+                &format!("the direction of the fibres of sheet '{name}'"),
+                &there,
+                &here,
+            )
         })?;
         let held = [
             ("thickness", "mm", 1e3, Some(told.thickness), thickness),

@@ -17,6 +17,7 @@ mod regions;
 mod sliding;
 mod small_part;
 mod stamping;
+mod steered;
 mod symmetry;
 mod taken_up;
 mod tools;

@@ -250,9 +250,9 @@ impl<'a> FrictionTable<'a> {
         let found = whose(law, touching.parts, plies)?;
         let family = usize::from(law.family != 1);
         let (own, first_cell) = cells(model, &found.name);
-        let laid = found.laid().map_err(|e| {
-            FormingError::Scene(format!("fibre_1 of sheet '{}': {e}", found.name))
-        })?;
+        let laid = found
+            .laid()
+            .map_err(|e| FormingError::Scene(format!("fibre_1 of sheet '{}': {e}", found.name)))?;
         // The model lies flat yet.
         let along = |cell: usize| {
             let direction = laid.in_cell(&own[cell].map(|n| model.x()[n as usize]))[family];
