@@ -83,7 +83,7 @@ fn draw_fibres(
         let (on_flat, on_draped) = (flat.layer(&layer, 8), draped.layer(&layer, 8));
         let lines = laid_fibres(&net, (laid, scale), family, scale * request.net);
         for fibre in lines.map_err(refused)? {
-            flat.open_plane(on_flat, &fibre.flat);
+            flat.open_plane(on_flat, &fibre.flat, laid.straight().is_some());
             draped.line(on_draped, &fibre.formed, false);
         }
     }
