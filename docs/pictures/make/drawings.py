@@ -60,6 +60,27 @@ def export():
     return style.save_png(figure, "export", [])
 
 
+def steered():
+    """Left the flat ply with its steered fibres, right where they lie on the formed ply."""
+    place = runs.run("blanks/workflow-steered")
+    formed = runs.artifact(place, "formed")
+    with tempfile.TemporaryDirectory() as folder:
+        file, *store = place
+        runs.plyflow("export", file, "formed", *store, "--format", "dxf", "--unit", "mm", "--net", "12 mm", "--to", folder)
+        flat, on_part = (_lines(Path(folder) / f"formed-{what}.dxf") for what in ("flat", "draped"))
+    figure, axes = style.canvas(2 * WIDTH, HEIGHT + 20)
+    scale = 0.85 * HEIGHT / 0.22
+    for layer, points in flat:
+        if layer in COLOURS:
+            axes.plot(WIDTH / 2 + scale * points[:, 0], 10 + HEIGHT / 2 - scale * points[:, 1], color=COLOURS[layer], linewidth=1.6 if layer == "ply_1" else 0.8)
+    view = scene3d.View((WIDTH, HEIGHT), scene3d.Camera(-62, 38, (0.0, 0.0, 0.02), 0.25))
+    view.surface(formed.points("ply_1"), formed.cells("ply_1"), (0.93, 0.92, 0.88))
+    for layer, line in on_part:
+        view.lines(np.stack([line[:-1], line[1:]], axis=1), COLOURS[layer], 2.0 if layer == "ply_1" else 1.2, lift=OVER_PLY)
+    style.put(axes, view.picture(), WIDTH, 10)
+    return style.save_png(figure, "steered", [])
+
+
 # The plies of the hat stringer, the one nearest to the tool first.
 LAYUP = {"skin": (0.35, 0.35, 0.35), "doubler": (0.0, 0.45, 0.70), "cap": (0.84, 0.37, 0.0)}
 

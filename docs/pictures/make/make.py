@@ -21,7 +21,8 @@ PICTURES = {
     "unidirectional": coupons.unidirectional, "hysteresis": coupons.hysteresis, "double-dome": coupons.double_dome,
     "hemisphere": coupons.hemisphere, "speed-error": diagrams.speed_error, "bag-layers": diagrams.bag_layers,
     "workflow-graph": diagrams.workflow_graph, "floors": diagrams.floors, "law-in-python": law.law_in_python,
-    "files-of-others": others.files_of_others, "export": drawings.export, "single-diaphragm": films.single_diaphragm, "new-part": drawings.new_part, "study": browser.study, "report": browser.report,
+    "files-of-others": others.files_of_others, "export": drawings.export, "steered": drawings.steered, "new-part": drawings.new_part,
+    "single-diaphragm": films.single_diaphragm, "study": browser.study, "report": browser.report,
     "report-answer": browser.report_answer, "report-limits": browser.report_limits, "report-fibres": browser.report_fibres,
     "report-inputs": browser.report_inputs, "report-beside": browser.report_beside,
 }

@@ -17,6 +17,8 @@ pub const LENGTH: f64 = 0.1;
 pub const SHEAR: f64 = 0.4;
 /// Stretch along x at the end.
 pub const STRETCH: f64 = 1.1;
+/// Without `straight`: by how much fibres turn along x (rad).
+pub const STEERED: f64 = 0.5;
 /// Turn about x at the end (rad).
 pub const TURN: f64 = std::f64::consts::FRAC_PI_6;
 
@@ -58,8 +60,14 @@ fn sheets(without: &[String]) -> Value {
             sheet["areal_mass"] = json!(0.44);
         }
         if has("fibres") {
-            sheet["fibre_1"] = json!(fibre_1.to_radians());
-            sheet["fibre_2"] = json!((fibre_1 + 90.0).to_radians());
+            let first = fibre_1.to_radians();
+            if has("straight") {
+                sheet["fibre_1"] = json!(first);
+                sheet["fibre_2"] = json!((fibre_1 + 90.0).to_radians());
+            } else {
+                let half = 0.5 * LENGTH;
+                sheet["steering"] = json!([[-half, 0.0, first], [half, 0.0, first + STEERED]]);
+            }
         }
         sheet
     };
@@ -122,6 +130,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut words = std::env::args().skip(1);
     let path = words
         .next()
-        .ok_or("usage: sheared-square FILE [fibres|thickness|mass|drape]..")?;
+        .ok_or("usage: sheared-square FILE [fibres|straight|thickness|mass|drape]..")?;
     Ok(write(&path, &words.collect::<Vec<_>>())?)
 }

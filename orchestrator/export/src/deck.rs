@@ -74,7 +74,7 @@ impl Laminate<'_> {
 
 fn laminate<'a>(shells: &'a Shells<'_>) -> Option<Laminate<'a>> {
     let ply = shells.body.ply.as_ref()?;
-    ply.sheet.fibres()?;
+    ply.laid.as_ref()?;
     Some(Laminate {
         ply,
         thickness: ply.thickness.as_ref()?,

@@ -5,9 +5,10 @@
 mod drawing;
 
 use crate::boundary::loops;
+use crate::curves::laid_fibres;
 use crate::error::ExportError;
 use crate::file::File;
-use crate::net::{Net, TooMany, fibres, rounded_up};
+use crate::net::{Net, TooMany, rounded_up};
 use crate::part::{Body, Part, Ply};
 use crate::request::Request;
 use crate::vec3::Vec3;
@@ -59,7 +60,7 @@ fn draw_fibres(
     request: &Request,
     [flat, draped]: [&mut Drawing; 2],
 ) -> Result<(), ExportError> {
-    let Some(directions) = ply.sheet.fibres() else {
+    let Some(laid) = &ply.laid else {
         return Ok(());
     };
     let through = body.usable();
@@ -77,11 +78,12 @@ fn draw_fibres(
         most: e.most,
         would: rounded_up(e.would / scale),
     };
-    for (family, angle) in directions.into_iter().enumerate() {
+    for family in 0..2 {
         let layer = format!("{}-fibres_{}", body.name, family + 1);
         let (on_flat, on_draped) = (flat.layer(&layer, 8), draped.layer(&layer, 8));
-        for fibre in fibres(&net, angle, scale * request.net).map_err(refused)? {
-            flat.open_plane(on_flat, &fibre.flat);
+        let lines = laid_fibres(&net, (laid, scale), family, scale * request.net);
+        for fibre in lines.map_err(refused)? {
+            flat.open_plane(on_flat, &fibre.flat, laid.straight().is_some());
             draped.line(on_draped, &fibre.formed, false);
         }
     }

@@ -8,6 +8,7 @@
 
 mod boundary;
 mod csv;
+mod curves;
 mod deck;
 mod dxf;
 mod error;
@@ -21,6 +22,7 @@ mod shells;
 mod vec3;
 mod vtu;
 
+pub use curves::{Field, laid_fibres, pieces};
 pub use error::ExportError;
 pub use fibres::{Sheared, deviations, sheared};
 pub use file::File;

@@ -27,11 +27,7 @@ pub fn write(part: &Part, stem: &str, files: &mut Vec<File>, told: &mut Vec<Stri
     for (k, shells) in all.iter().enumerate() {
         grid(&mut text, shells);
         let property = 10 * (k + 1);
-        let ply = shells
-            .body
-            .ply
-            .as_ref()
-            .filter(|p| p.sheet.fibres().is_some());
+        let ply = shells.body.ply.as_ref().filter(|p| p.laid.is_some());
         if let Some((ply, thickness)) = ply.and_then(|p| Some((p, p.thickness.as_ref()?))) {
             let name = ply.sheet.material.as_deref().unwrap_or("fabric");
             let known = materials.iter().position(|m| *m == name);

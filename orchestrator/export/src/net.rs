@@ -5,7 +5,7 @@ use plyflow_fixed::FixedBits;
 use std::collections::BTreeMap;
 
 /// Most lines of a family in a ply: more than anybody looks at, and than a cutter draws.
-const MOST: usize = 10_000;
+pub(crate) const MOST: usize = 10_000;
 
 /// A line of fibres, flat and formed, point by point.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,7 +32,7 @@ pub struct Net<'a> {
 }
 
 impl Net<'_> {
-    fn corners(&self, cell: usize) -> &[u32] {
+    pub(crate) fn corners(&self, cell: usize) -> &[u32] {
         &self.cells[cell * self.corners..(cell + 1) * self.corners]
     }
 }

@@ -6,6 +6,7 @@ use crate::request::{Format, LengthUnit, Request};
 use crate::vec3::Vec3;
 use plyflow_artifact::{Artifact, BodyInfo, On};
 use plyflow_model::artifact::{Forming, Sheet};
+use plyflow_model::steering::Laid;
 use serde_json::Value;
 
 /// Bodies in one frame.
@@ -68,6 +69,8 @@ pub struct Ply {
     pub number: usize,
     /// What the artifact tells of it.
     pub sheet: Sheet,
+    /// Directions of its fibres in the flat ply (by place in metres), where they are told.
+    pub laid: Option<Laid>,
     /// Of each cell its fibres; `None` where they are not known.
     pub sheared: Vec<Option<Sheared>>,
     /// Of each cell its thickness at constant volume (in the unit of lengths), where that of the flat ply is known.
@@ -88,7 +91,7 @@ impl Body {
     /// The cells that have a shape, and fibres where the ply has any.
     pub fn usable(&self) -> Vec<usize> {
         let known = |cell: &usize| match &self.ply {
-            Some(ply) if ply.sheet.fibres().is_some() => ply.sheared[*cell].is_some(),
+            Some(ply) if ply.laid.is_some() => ply.sheared[*cell].is_some(),
             _ => true,
         };
         let shaped = (0..self.count()).filter(|c| self.shaped[*c]);
@@ -308,21 +311,29 @@ fn add(
     });
 }
 
-/// The fields that follow from the shape of a ply. What the artifact does not tell is said, and no field of it is made.
-fn derive(body: &mut Body, number: usize, sheet: &Sheet, told: &mut Vec<String>) {
-    // A ply without fibres has an area all the same.
-    let fibres = sheet.fibres().unwrap_or([0.0, std::f64::consts::FRAC_PI_2]);
+/// The shapes of the cells of a ply. `laid`: `None` of one whose fibres are not told, which has an area all the same.
+fn shapes(body: &Body, laid: Option<&Laid>) -> Vec<Option<Sheared>> {
+    let any = Laid::Straight([0.0, std::f64::consts::FRAC_PI_2]);
+    let laid = laid.unwrap_or(&any);
     let of = |cell: usize| {
         let at = |points: &[Vec3]| -> Vec<Vec3> {
             let corners = body.corners(cell).iter();
             corners.map(|i| points[*i as usize]).collect()
         };
+        let flat = at(&body.flat);
         let shaped = body.shaped[cell];
         shaped
-            .then(|| sheared(&at(&body.flat), &at(&body.points), fibres))
+            .then(|| sheared(&flat, &at(&body.points), laid.in_cell(&flat)))
             .flatten()
     };
-    let shapes: Vec<Option<Sheared>> = (0..body.count()).map(of).collect();
+    (0..body.count()).map(of).collect()
+}
+
+/// The fields that follow from the shape of a ply. What the artifact does not tell is said, and no field of it is made.
+fn derive(body: &mut Body, number: usize, sheet: &Sheet, told: &mut Vec<String>) {
+    // A ply without fibres has an area all the same.
+    let laid = sheet.laid();
+    let shapes = shapes(body, laid.as_ref());
     let over = |value: f64| -> Vec<f64> {
         let of = |s: &Option<Sheared>| s.map_or(f64::NAN, |s| value / s.area_ratio);
         shapes.iter().map(of).collect()
@@ -339,7 +350,7 @@ fn derive(body: &mut Body, number: usize, sheet: &Sheet, told: &mut Vec<String>)
         told,
     );
     let mut unknown = Vec::new();
-    match sheet.fibres() {
+    match &laid {
         Some(laid) => add_fibres(body, &shapes, laid, told),
         None => unknown.push("its fibre directions"),
     }
@@ -360,13 +371,14 @@ fn derive(body: &mut Body, number: usize, sheet: &Sheet, told: &mut Vec<String>)
     body.ply = Some(Ply {
         number,
         sheet: sheet.clone(),
+        laid,
         sheared: shapes,
         thickness,
     });
 }
 
-/// `laid`: directions of both families in the flat ply (rad, from x).
-fn add_fibres(body: &mut Body, shapes: &[Option<Sheared>], laid: [f64; 2], told: &mut Vec<String>) {
+/// `laid`: directions of both families in the flat ply.
+fn add_fibres(body: &mut Body, shapes: &[Option<Sheared>], laid: &Laid, told: &mut Vec<String>) {
     for family in 0..2 {
         let of = |s: &Option<Sheared>| s.map_or([f64::NAN; 3], |s| s.directions[family]);
         let values = shapes.iter().flat_map(of).collect();
@@ -384,8 +396,12 @@ fn add_fibres(body: &mut Body, shapes: &[Option<Sheared>], laid: [f64; 2], told:
         told,
     );
     // As the limit `fibre_deviation` counts them: none where the ply stands across the axis from which they are told.
-    let turned = |s: &Option<Sheared>| deviations(s.as_ref()?, laid);
-    let turned: Vec<Option<[f64; 2]>> = shapes.iter().map(turned).collect();
+    let turned = |(cell, s): (usize, &Option<Sheared>)| {
+        let corners = body.corners(cell).iter();
+        let flat: Vec<Vec3> = corners.map(|i| body.flat[*i as usize]).collect();
+        deviations(s.as_ref()?, laid.in_cell(&flat))
+    };
+    let turned: Vec<Option<[f64; 2]>> = shapes.iter().enumerate().map(turned).collect();
     for family in 0..2 {
         let of = |d: &Option<[f64; 2]>| d.map_or(f64::NAN, |d| d[family]);
         let field = format!("fibre_deviation_{}", family + 1);

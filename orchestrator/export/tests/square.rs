@@ -129,6 +129,85 @@ fn tables_have_fibres_thickness_and_mass_of_the_closed_form() {
     }
 }
 
+/// Angle (degrees) of the steered fibres of the square at x (m): between the two points of their table the vectors at twice the angle are mixed.
+fn steered(first: f64, x: f64) -> f64 {
+    let share = x / square::LENGTH + 0.5;
+    let ends = [first.to_radians(), first.to_radians() + square::STEERED];
+    let mixed = |of: fn(f64) -> f64| (1.0 - share) * of(2.0 * ends[0]) + share * of(2.0 * ends[1]);
+    (0.5 * mixed(f64::sin).atan2(mixed(f64::cos))).to_degrees()
+}
+
+#[test]
+fn steered_fibres_have_the_closed_form_of_each_place_in_tables_and_drawings() {
+    let (_keep, artifact) = artifact(&["straight"]);
+    let made = export(&artifact, &request(Format::Csv)).unwrap();
+    assert_eq!(made.told, Vec::<String>::new());
+    let step = square::LENGTH / 4.0;
+    for (ply, first) in [("lower", 0.0), ("upper-2", 45.0)] {
+        let table = text(&made, &format!("square-{ply}-cells.csv"));
+        let along_x = column(table, "fibre_direction_1_x");
+        let across_x = column(table, "fibre_direction_2_x");
+        let turned = column(table, "fibre_deviation_1 (rad)");
+        for cell in 0..16 {
+            let x = (cell % 4) as f64 * step + 0.5 * step - 0.5 * square::LENGTH;
+            let angle = steered(first, x);
+            let expected = closed_form(angle).0;
+            assert!((along_x[cell].abs() - expected[0].abs()).abs() < 1e-13);
+            assert!((across_x[cell].abs() - closed_form(angle + 90.0).0[0].abs()).abs() < 1e-13);
+            let (tilt_sin, tilt_cos) = square::TURN.sin_cos();
+            let across = tilt_cos * expected[1] + tilt_sin * expected[2];
+            let wanted = across.atan2(expected[0]) - angle.to_radians();
+            assert!(
+                (turned[cell] - wanted).abs() < 1e-13,
+                "{}, {wanted}",
+                turned[cell]
+            );
+        }
+    }
+    // Whatever the unit, lines follow the directions.
+    for (unit, metres) in [(LengthUnit::Metre, 1.0), (LengthUnit::Millimetre, 1e-3)] {
+        let drawing = export(
+            &artifact,
+            &Request {
+                unit,
+                ..request(Format::Dxf)
+            },
+        )
+        .unwrap();
+        let flat = text(&drawing, "square-flat.dxf");
+        let words: Vec<&str> = flat.lines().map(str::trim).collect();
+        let mut checked = 0;
+        for (k, _) in words
+            .iter()
+            .enumerate()
+            .filter(|(_, w)| **w == "LWPOLYLINE")
+        {
+            let end =
+                (k + 1..words.len()).find(|i| words[*i] == "LWPOLYLINE" || words[*i] == "ENDSEC");
+            let own = &words[k..end.unwrap_or(words.len())];
+            let pairs: Vec<(&str, &str)> = own[1..].chunks_exact(2).map(|p| (p[0], p[1])).collect();
+            let layer = pairs.iter().find(|p| p.0 == "8").unwrap().1;
+            if layer != "lower-fibres_1" {
+                continue;
+            }
+            let of = |code: &str| -> Vec<f64> {
+                let all = pairs.iter().filter(|p| p.0 == code);
+                all.map(|p| p.1.parse::<f64>().unwrap() * metres).collect()
+            };
+            let (x, y) = (of("10"), of("20"));
+            assert!(x.len() > 2, "a curve has more than its ends");
+            for i in 1..x.len() {
+                let [a, b] = [x[i] - x[i - 1], y[i] - y[i - 1]];
+                let angle = steered(0.0, 0.5 * (x[i] + x[i - 1])).to_radians();
+                // Across the chord of a step, of which the curve bends by less than 0.1 rad.
+                assert!((b * angle.cos() - a * angle.sin()).abs() < 1e-3 * a.hypot(b) + 1e-9);
+                checked += 1;
+            }
+        }
+        assert!(checked > 20, "{checked}");
+    }
+}
+
 #[test]
 fn lengths_are_in_the_unit_that_was_asked_for_and_nothing_else_is() {
     let (_keep, artifact) = artifact(&[]);

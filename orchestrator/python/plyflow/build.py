@@ -192,7 +192,7 @@ class Workflow(_Document):
         self.setdefault("responses", {})[name] = {"step": step, "result": result}
 
 
-def ply(name: str, of: PathLike, length: str, width: str, fibres: tuple[Angle, Angle], **more: Any) -> dict[str, Any]:
+def ply(name: str, of: PathLike, length: str, width: str, fibres: tuple[Angle, Angle] | PathLike | Mapping[str, Any], **more: Any) -> dict[str, Any]:
     """A ply of a scene, a rectangle unless ``outline`` is given.
 
     Args:
@@ -200,14 +200,23 @@ def ply(name: str, of: PathLike, length: str, width: str, fibres: tuple[Angle, A
         of: path of a material file, or the name of a material that comes along (:func:`plyflow.material`).
         length: along x, such as ``"480 mm"``.
         width: along y.
-        fibres: directions of both families from x: texts with a unit, or numbers in degrees.
+        fibres: directions of both families from x: texts with a unit, or numbers in degrees. Of steered fibres the path of a table of directions, or
+            what stands in the file: ``{"points": [{"x": "0 mm", "y": "0 mm", "angle": "10 deg"}, ..]}``.
         more: further keys of a sheet.
 
     >>> ply("ply_1", "mine.yaml", "480 mm", "300 mm", (-45, "45 deg"))["fibre_1"]
     '-45 deg'
+    >>> ply("ply_1", "mine.yaml", "480 mm", "300 mm", "steered.csv")["fibre_1"]
+    {'table': {'file': 'steered.csv'}}
     """
-    first, second = (a if isinstance(a, str) else f"{a:g} deg" for a in fibres)
-    return {"name": name, "kind": "ply", "material": _material(of), "length": length, "width": width, "fibre_1": first, "fibre_2": second, **more}
+    sheet: dict[str, Any] = {"name": name, "kind": "ply", "material": _material(of), "length": length, "width": width}
+    if isinstance(fibres, Mapping):
+        sheet["fibre_1"] = dict(fibres)
+    elif isinstance(fibres, (str, os.PathLike)):
+        sheet["fibre_1"] = {"table": {"file": os.fspath(fibres)}}
+    else:
+        sheet["fibre_1"], sheet["fibre_2"] = (a if isinstance(a, str) else f"{a:g} deg" for a in fibres)
+    return {**sheet, **more}
 
 
 def diaphragm(name: str, of: PathLike = "stretchlon-ht350", **more: Any) -> dict[str, Any]:

@@ -81,7 +81,7 @@ pub fn check_part(path: &Utf8Path, catalog: &dyn Catalog) -> Option<Result<Part,
         key: root.span.clone(),
     };
     match part {
-        Part::Scene => crate::scene::scene_value(&mut resolver, &root, &place),
+        Part::Scene => crate::scene::scene_value(&mut resolver, &root, &place, false),
         Part::Material => crate::scene::checked_material(&mut resolver, &root, &place),
     };
     Some(match problems.count() {

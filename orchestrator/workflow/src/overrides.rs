@@ -150,7 +150,7 @@ fn words_to_file(declared: &IndexMap<String, Declaration>, path: &[Word]) -> Opt
     let mut declaration = declared.get(&path.first()?.name)?;
     for at in 1..path.len() {
         declaration = match &declaration.shape {
-            Shape::Scene | Shape::SheetMaterial => return Some(at),
+            Shape::Scene { .. } | Shape::SheetMaterial => return Some(at),
             Shape::Object(fields) => fields.get(&path[at].name)?,
             Shape::List(of, _) | Shape::Map(of) => of,
             _ => return None,

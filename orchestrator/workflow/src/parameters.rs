@@ -183,7 +183,9 @@ impl<'a> Resolver<'a> {
                 }
                 _ => self.wrong(node, at, &d.shape.expected()),
             },
-            Shape::Scene => crate::scene::resolve(self, node, at),
+            Shape::Scene { straight_fibres } => {
+                crate::scene::resolve(self, node, at, *straight_fibres)
+            }
             Shape::SheetMaterial => crate::scene::sheet_material(self, node, at),
             Shape::File => match node.text() {
                 Some(text) => self.file(text, node, at).map(|path| json!(path)),

@@ -1,5 +1,7 @@
-//! The words of a scene that stand for files: the plies of a ply book, and contours that are drawn in a file. What the files say takes the place of
+//! The words of a scene that stand for files: the plies of a ply book, contours that are drawn in a file, and directions of a table. What the files say takes the place of
 //! these words in the tree, as if it were written there; each value still knows where in which file it stands.
+
+mod steered;
 
 use crate::diagnostics::{Mention, Problems, Source};
 use crate::evidence;
@@ -73,6 +75,7 @@ pub(crate) fn fill(scene: &Node, source: &Source, problems: &mut Problems) -> Op
             None => {
                 let mut sheet = sheet.clone();
                 filler.contours_of(&mut sheet);
+                filler.steering_of(&mut sheet);
                 filled.push(sheet);
             }
         }
@@ -92,6 +95,9 @@ fn names_files(sheet: &Node) -> bool {
     let drawn = |c: &Node| c.get("drawing").is_some();
     let all = |key: &str| sheet.get(key).map_or(&[][..], Node::items).iter();
     sheet.get("plies").is_some()
+        || sheet
+            .get("fibre_1")
+            .is_some_and(|f| f.get("table").is_some())
         || sheet.get("outline").is_some_and(drawn)
         || all("holes").any(drawn)
         || all("regions").any(|r| r.get("polygon").is_some_and(drawn))

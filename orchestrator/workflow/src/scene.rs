@@ -91,7 +91,14 @@ fn shown(path: &Utf8Path) -> Utf8PathBuf {
 }
 
 /// Resolves a parameter of type `scene`.
-pub fn resolve(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Option<Value> {
+///
+/// `straight_fibres`: whether the step cannot do with steered fibres.
+pub fn resolve(
+    resolver: &mut Resolver<'_>,
+    node: &Node,
+    at: &Place<'_>,
+    straight_fibres: bool,
+) -> Option<Value> {
     match &node.kind {
         Kind::Text(file) => {
             let (source, scene) = read(resolver.problems, at.source, &node.span, file)?;
@@ -100,10 +107,12 @@ pub fn resolve(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Opti
                 key: scene.span.clone(),
                 ..at.clone()
             };
-            scene_value(resolver, &scene, &place)
+            scene_value(resolver, &scene, &place, straight_fibres)
         }
-        Kind::Map(_) if node.get("file").is_some() => changed_scene(resolver, node, at),
-        Kind::Map(_) => scene_value(resolver, node, at),
+        Kind::Map(_) if node.get("file").is_some() => {
+            changed_scene(resolver, node, at, straight_fibres)
+        }
+        Kind::Map(_) => scene_value(resolver, node, at, straight_fibres),
         _ => {
             let message = format!("`{}` is {}", at.what, node.describe());
             let d = resolver.problems.add(at.source, &node.span, message);
@@ -115,7 +124,12 @@ pub fn resolve(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Opti
 }
 
 /// The scene of `{file: .., set: {..}}`, where `set` has values by their path in the file.
-fn changed_scene(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Option<Value> {
+fn changed_scene(
+    resolver: &mut Resolver<'_>,
+    node: &Node,
+    at: &Place<'_>,
+    straight_fibres: bool,
+) -> Option<Value> {
     only_keys(resolver, node, at, &["file", "set"]);
     let file = file_of(resolver, node, at, "the path of a scene file")?;
     let (mut source, mut scene) = read(resolver.problems, at.source, &file.span, file.text()?)?;
@@ -128,7 +142,7 @@ fn changed_scene(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Op
         key: scene.span.clone(),
         ..at.clone()
     };
-    let value = scene_value(resolver, &scene, &place);
+    let value = scene_value(resolver, &scene, &place, straight_fibres);
     value.filter(|_| resolver.problems.count() == before)
 }
 
@@ -159,8 +173,13 @@ fn file_of<'n>(
     Some(file)
 }
 
-/// The canonical form of a scene.
-pub fn scene_value(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> Option<Value> {
+/// The canonical form of a scene. `straight_fibres`: whether the step cannot do with steered fibres.
+pub fn scene_value(
+    resolver: &mut Resolver<'_>,
+    node: &Node,
+    at: &Place<'_>,
+    straight_fibres: bool,
+) -> Option<Value> {
     let before = resolver.problems.count();
     let wanted = "a scene, with `plyflow_scene: 1`";
     if other_format(node, "plyflow_scene", wanted, at.source, resolver.problems) {
@@ -183,6 +202,7 @@ pub fn scene_value(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> 
     if filled.as_ref().is_none_or(|f| f.sound) {
         scene_rules::tell(node, &materials, &found, at.source, resolver.problems);
     }
+    steered(node, at, straight_fibres, resolver.problems);
     if resolver.problems.count() > before {
         return None;
     }
@@ -211,6 +231,28 @@ pub fn scene_value(resolver: &mut Resolver<'_>, node: &Node, at: &Place<'_>) -> 
                 .problems
                 .add(at.source, &at.key, format!("the scene cannot be read: {e}"));
             None
+        }
+    }
+}
+
+/// Reports the plies whose fibres are steered, for a step that cannot do with them.
+fn steered(scene: &Node, at: &Place<'_>, straight_fibres: bool, problems: &mut Problems) {
+    if !straight_fibres {
+        return;
+    }
+    for sheet in scene.get("sheets").map_or(&[][..], Node::items) {
+        let Some(fibres) = sheet.get("fibre_1") else {
+            continue;
+        };
+        if ["points", "table"].iter().any(|k| fibres.get(k).is_some()) {
+            let name = sheet.get("name").and_then(Node::text).unwrap_or_default();
+            let message =
+                format!("the fibres of ply `{name}` are steered, which this step cannot compute");
+            let d = problems.add(at.source, &fibres.span, message);
+            d.expected(
+                "one direction for all of the ply, such as `fibre_1: 0 deg` with `fibre_2: 90 deg`",
+            );
+            d.help("forming-explicit forms steered plies");
         }
     }
 }

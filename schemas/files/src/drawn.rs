@@ -52,19 +52,27 @@ pub fn read(
         let flaw = Flaw::whole("it is a table of corners, which has no layers");
         return Err(vec![flaw.expected("a DXF drawing where a layer is named")]);
     }
+    corners::read(text, symbol(unit).map_err(|f| vec![f])?)
+}
+
+/// The name of a unit (m) in which the numbers of a table are.
+///
+/// # Errors
+/// When it has none.
+pub fn symbol(unit: Option<f64>) -> Result<Option<&'static str>, Flaw> {
     let symbol = unit.map(|metres| match dxf::Unit::of(metres) {
         dxf::Unit::Symbol(symbol) => Ok(symbol),
         dxf::Unit::Metres(_) => {
             let problem = format!(
-                "the corners of a table cannot be in units of {}",
+                "the places of a table cannot be in units of {}",
                 si_text(metres, Dimension::Length)
             );
-            Err(vec![Flaw::whole(problem).expected(
-                "a unit that has a name, such as `1 mm`, or units in the table's head",
-            )])
+            let flaw = Flaw::whole(problem);
+            Err(flaw
+                .expected("a unit that has a name, such as `1 mm`, or units in the table's head"))
         }
     });
-    corners::read(text, symbol.transpose()?)
+    symbol.transpose()
 }
 
 #[cfg(test)]

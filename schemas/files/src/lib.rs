@@ -1,7 +1,7 @@
 //! Files that users name: tools, scans and tests as the field's programs write them.
 //!
 //! One reader for each kind of file, and one place for its dialects: [`stl`] for facets, [`dxf`] for drawings, [`book`] for
-//! ply books, [`corners`] for tables of corners ([`drawn`] for
+//! ply books, [`steered`] for tables of fibre directions, [`corners`] for tables of corners ([`drawn`] for
 //! either of the two), [`rows`] for everything in columns. Under
 //! them [`open`] (what is opened at all, and how much of it is read), [`text`] (encodings, and what a message may show of a file) and
 //! [`number`] (decimal signs). What is no dialect that is known here is refused, with its line; nothing is passed over in silence.
@@ -17,6 +17,7 @@ pub mod flaw;
 pub mod number;
 pub mod open;
 pub mod rows;
+pub mod steered;
 pub mod stl;
 pub mod table;
 pub mod text;

@@ -24,6 +24,7 @@ pub mod rules;
 pub mod scene;
 pub mod schema;
 pub mod stamping;
+pub mod steering;
 pub mod text;
 pub mod tool;
 pub mod units;

@@ -235,7 +235,10 @@ pub enum Shape {
     /// A mapping of these names.
     Object(IndexMap<String, Declaration>),
     /// A scene file or the scene itself.
-    Scene,
+    Scene {
+        /// Whether the step cannot do with plies whose fibres are steered: such a scene is refused when it is planned.
+        straight_fibres: bool,
+    },
     /// A material of a sheet: a material file, the material itself, or a file with other parameters.
     SheetMaterial,
     /// A path.
@@ -268,7 +271,7 @@ impl Shape {
                 let names: Vec<&str> = fields.keys().map(String::as_str).collect();
                 format!("a mapping with {}", names.join(", "))
             }
-            Shape::Scene => "the path of a scene file, or a scene".into(),
+            Shape::Scene { .. } => "the path of a scene file, or a scene".into(),
             Shape::SheetMaterial => {
                 "the path of a material file, a material, or `{file: .., with: {..}}`".into()
             }

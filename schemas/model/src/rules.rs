@@ -8,6 +8,7 @@ pub mod process;
 pub mod regions;
 pub mod sheets;
 pub mod stamping;
+pub mod steering;
 pub mod surfaces;
 pub mod symmetry;
 

@@ -22,6 +22,9 @@ pub use crate::process::{
 pub use crate::stamping::{
     ForceCourse, Gripper, MatchingDie, PartMotion, Pressed, Side, Stamping, StampingPart, Vertical,
 };
+pub use crate::steering::{
+    FibreDirection, Laid, SteeredPoint, Steering, SteeringError, SteeringTable, first_axis,
+};
 pub use crate::tool::{
     DoubleDomeTool, FlatTool, GivenSurface, HemisphereTool, InputTool, Joggle, JoggleSpar,
     RampedSpar, StlTool, TetrahedronTool, Tool,
@@ -153,11 +156,11 @@ pub struct Sheet {
     /// Plies: position of the centre over the tool; of an outline, of its point (0, 0).
     #[serde(default)]
     pub centre: [Length; 2],
-    /// Plies: direction of fibre family 1 from x, counter-clockwise seen from above.
+    /// Plies: direction of fibre family 1 from x, counter-clockwise seen from above; of steered fibres a table of directions by place.
     #[serde(default)]
-    pub fibre_1: Angle,
+    pub fibre_1: FibreDirection,
     /// Plies: direction of fibre family 2; the stitch lies between family 1 and 2, so that positive
-    /// shear stretches it.
+    /// shear stretches it. Left out with steered fibres: there it lies 90 deg from family 1 at each place.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fibre_2: Option<Angle>,
     /// Plies: places with another friction, or without stitches.
@@ -220,16 +223,35 @@ impl Sheet {
         Ok(region.or_else(|| self.rectangle().map(Region::rectangle)))
     }
 
-    /// Directions of the fibre families (rad): the second a quarter turn on where it is not stated.
-    pub fn fibres(&self) -> [f64; 2] {
-        let first = self.fibre_1.si();
+    /// Directions of the fibre families (rad): the second a quarter turn on where it is not stated. `None` of a ply whose fibres are steered.
+    pub fn fibres(&self) -> Option<[f64; 2]> {
+        let FibreDirection::Straight(first) = &self.fibre_1 else {
+            return None;
+        };
+        let first = first.si();
         let square = || first + std::f64::consts::FRAC_PI_2;
-        [first, self.fibre_2.map_or_else(square, |a| a.si())]
+        Some([first, self.fibre_2.map_or_else(square, |a| a.si())])
     }
 
-    /// What mirror planes do to its fibre families, the same for both planes; `None` where its fibres lie askew to them.
+    /// Directions of the fibre families by place.
+    ///
+    /// # Errors
+    /// When its points tell none, or have not been read.
+    pub fn laid(&self) -> Result<Laid, SteeringError> {
+        match &self.fibre_1 {
+            FibreDirection::Straight(_) => {
+                let fibres = self.fibres().unwrap_or_default();
+                Ok(Laid::Straight(fibres))
+            }
+            FibreDirection::Steered(steering) => {
+                Laid::steered(steering.points(self.centre.map(|c| c.si()))?)
+            }
+        }
+    }
+
+    /// What mirror planes do to its fibre families, the same for both planes; `None` where its fibres lie askew to them, or are steered.
     pub fn families(&self) -> Option<Families> {
-        let [first, second] = self.fibres();
+        let [first, second] = self.fibres()?;
         let axis = first_axis(first, second);
         let (x, y) = (axis.fixed_cos().abs(), axis.fixed_sin().abs());
         if x.min(y) < FIBRES_APART {
@@ -252,22 +274,4 @@ pub enum Families {
     Kept,
     /// They are each other's; shear keeps its sign.
     Exchanged,
-}
-
-/// Direction (rad, from x) of the first axis of a ply whose fibre families lie at `fibre_1` and `fibre_2` (rad): that of the family
-/// which the other follows counter-clockwise, so that the stitch lies between the first axis and the second. Elements and their
-/// membrane forces have these axes, whichever way round the scene names the families.
-///
-/// ```
-/// use plyflow_model::scene::first_axis;
-/// let deg = f64::to_radians;
-/// assert_eq!(first_axis(deg(-45.0), deg(45.0)), deg(-45.0));
-/// assert_eq!(first_axis(deg(45.0), deg(-45.0)), deg(-45.0));
-/// ```
-pub fn first_axis(fibre_1: f64, fibre_2: f64) -> f64 {
-    if (fibre_2 - fibre_1).fixed_sin() >= 0.0 {
-        fibre_1
-    } else {
-        fibre_2
-    }
 }

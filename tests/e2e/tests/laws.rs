@@ -29,6 +29,13 @@ fn unidirectional() -> Value {
         "bending": {"family_1": {"positive": {"stiffness": 4e-3}}, "family_2": {"positive": {"stiffness": 4e-5}}, "families": "same"}})
 }
 
+/// A fabric whose fibres buckle within the ply, by a curve for each family.
+fn crushed() -> Value {
+    json!({"form": "fibre-energy", "fibre_modulus": 3e9, "thickness": 3e-4, "areal_mass": 0.3, "shear": {"coefficients": [0.0, 60.0, 0.0, 120.0]},
+        "compression": {"table": {"strains": [0.0, 0.001, 0.003, 0.02], "stresses": [0.0, 2e6, 4e6, 5e6]}},
+        "compression_2": {"table": {"strains": [0.0, 0.002, 0.03], "stresses": [0.0, 1e6, 2e6]}}})
+}
+
 fn made(with: &Value) -> Mat {
     fabric(&with.to_string()).unwrap_or_else(|e| panic!("{e}"))
 }
@@ -159,6 +166,41 @@ fn moduli_and_their_share_in_compression_are_told_as_the_law_has_them() {
                     (found / (factor * e.unwrap()) - 1.0).abs() < 1e-4,
                     "family {family} at {strain}: {found}"
                 );
+            }
+        }
+    }
+}
+
+#[test]
+fn curves_of_compressed_fibres_are_the_stresses_of_the_law_by_family() {
+    let mut same = crushed();
+    same.as_object_mut().unwrap().remove("compression_2");
+    for (with, expected) in [
+        (crushed(), vec!["family 1", "family 2"]),
+        (same, vec!["both families"]),
+    ] {
+        let (curves, words) = law_curves("material-fabric", &with);
+        let (law, drawn) = (made(&with), of(&curves, "Fibres in compression"));
+        let names: Vec<&str> = drawn.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(names, expected);
+        // A curve is no share.
+        assert!(words.iter().all(|w| w.0 != "Share of it in compression"));
+        for (k, curve) in drawn.iter().enumerate() {
+            let families = if expected.len() == 1 { 0..2 } else { k..k + 1 };
+            assert!(curve.x.len() > 2);
+            for family in families {
+                for (x, y) in curve.x.iter().zip(&curve.y) {
+                    let stretch = 1.0 - 0.01 * x;
+                    let mut metric = [1.0, 1.0, 0.0];
+                    metric[family] = stretch * stretch;
+                    let stress = Point::new(&law).at(&law, metric).stress[family] * stretch;
+                    is_close(
+                        -1e-6 * stress / 3e-4,
+                        *y,
+                        5.0,
+                        &format!("{} at {x} %", curve.name),
+                    );
+                }
             }
         }
     }

@@ -24,6 +24,10 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
         ],
         "ply-book" => vec![std::fs::read(fixture("plies.csv")).unwrap_or_default()],
         "drawing" => read(vec![fixture("ply.dxf"), fixture("corners.csv"), REPOSITORY.join("workflows/files-of-others/blank.dxf")]),
+        "steering" => texts(&[
+            "x [mm],y [mm],angle\n0,0,0\n100,0,20\n100,50,40 deg\n0,50,0.3 rad\n",
+            "x;y;direction;note\n1,5 cm;0 mm;-170;a\n0 m;0 mm;170;b\n",
+        ]),
         "quantity" => texts(&["5 mm", "-1.5e3 kPa", "45 °", "112.19 N/m", "20 °C", "1e-9 1/s2", "50 %", "3", "1/4 in"]),
         "expression" => texts(&[
             "-135 deg + ${angle}",

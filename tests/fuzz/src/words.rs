@@ -186,6 +186,7 @@ pub fn of(target: &str) -> Vec<String> {
         "stl" | "scan-facets" => add(&STL),
         "ply-book" => add(&[&CELLS[..], &BOOK].concat()),
         "drawing" => add(&[&CELLS[..], &DXF].concat()),
+        "steering" => add(&[&CELLS[..], &["angle", "direction", "deg", "rad"]].concat()),
         "expression" => add(&EXPRESSIONS),
         _ => {}
     }

@@ -71,10 +71,11 @@ impl Drawing {
     }
 
     /// A straight line in the plane of the drawing, through these points.
-    pub fn open_plane(&mut self, layer: usize, points: &[Vec3]) {
-        // A fibre of the flat ply is straight: its ends are enough.
-        if let [first, .., last] = points {
-            self.plane(layer, &[*first, *last], false);
+    pub fn open_plane(&mut self, layer: usize, points: &[Vec3], straight: bool) {
+        match points {
+            // The ends are enough.
+            [first, .., last] if straight => self.plane(layer, &[*first, *last], false),
+            points => self.plane(layer, points, false),
         }
     }
 

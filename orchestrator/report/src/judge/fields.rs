@@ -214,7 +214,8 @@ fn sheet(artifact: &Artifact, told: &plyflow_model::artifact::Sheet) -> Result<S
     };
     let bare = |i: &usize| draped.as_ref().is_some_and(|d| d[*i] <= 0.5);
     let formed = artifact.frame_points(name, frame).map_err(|e| said(&e))?;
-    let shape = PlyShape::of((&flat, &formed), &cells, None, (told.fibres(), None));
+    let laid = told.laid();
+    let shape = PlyShape::of((&flat, &formed), &cells, None, (laid.as_ref(), None));
     let deviation = shape.larger_deviation().map(of_kept);
     let unknown = |d: &Vec<f64>| -> Vec<([f64; 2], f64)> {
         let cells = kept.iter().zip(d).filter(|(_, d)| d.is_nan());

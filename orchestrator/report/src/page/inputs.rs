@@ -71,7 +71,8 @@ fn stack(sheets: &[Sheet]) -> Markup {
                 td class="n" { (k + 1) } th { (s.name) } td { @if s.is_ply() { "ply" } @else { "film" } } td { (s.material.as_deref().unwrap_or("–")) }
                 td class="n" { (quantity(s.thickness, "m", 3)) }
                 td class="n" { (s.areal_mass.map_or("–".to_owned(), |m| format!("{} g/m²", crate::units::number(m * 1e3, 4)))) }
-                td class="n" { (deg(s.fibre_1)) } td class="n" { (deg(s.fibre_2)) }
+                @if let Some(points) = &s.steering { td class="n" { "steered, " (points.len()) " points" } td class="n" { "across" } }
+                @else { td class="n" { (deg(s.fibre_1)) } td class="n" { (deg(s.fibre_2)) } }
                 td class="n" { (plies::size(s).unwrap_or_else(|| "–".into())) }
                 td class="n" { (plies::area(s).map_or("–".to_owned(), |a| quantity(a, "m2", 4))) }
             } } }

@@ -2,7 +2,7 @@
 
 use crate::plain::ply::Ply;
 use crate::plain::shape::Shape;
-use plyflow_export::{Fibre, Net, fibres};
+use plyflow_export::{Fibre, Net, laid_fibres};
 use plyflow_model::artifact::Sheet;
 
 impl Ply {
@@ -11,10 +11,10 @@ impl Ply {
         let Some(sheet) = sheets.iter().find(|s| s.name == self.name) else {
             return;
         };
-        self.fibres = sheet.fibres();
+        self.fibres = sheet.laid();
         self.thickness = Some(sheet.thickness).filter(|t| *t > 0.0);
         let draped = self.draped.as_deref();
-        let told = (self.fibres, self.thickness);
+        let told = (self.fibres.as_ref(), self.thickness);
         self.shape = Shape::of((&self.flat, &self.formed), &self.cells, draped, told);
         // What an artifact tells comes before what is computed here, as in exports.
         if self.others.iter().any(|o| o.title == "Thickness") {
@@ -24,7 +24,7 @@ impl Ply {
 
     /// Lines of a fibre family, `distance` (m) apart in the flat ply, through the cells that have a shape; none where the ply tells no fibres.
     pub(crate) fn fibre_lines(&self, family: usize, distance: f64) -> Vec<Fibre> {
-        let Some(laid) = self.fibres else {
+        let Some(laid) = &self.fibres else {
             return Vec::new();
         };
         let there = |k: &usize| self.draped.as_ref().is_none_or(|d| d[*k]);
@@ -36,6 +36,6 @@ impl Ply {
             corners: 4,
             through: &through,
         };
-        fibres(&net, laid[family], distance).unwrap_or_default()
+        laid_fibres(&net, (laid, 1.0), family, distance).unwrap_or_default()
     }
 }

@@ -1,6 +1,7 @@
 //! Meshes of plies and tool, with what is known at their points and in their cells.
 
 use crate::plain::shape::Shape;
+use plyflow_model::steering::Laid;
 
 /// A place or a direction in space.
 pub(crate) type Vec3 = [f64; 3];
@@ -68,8 +69,8 @@ pub(crate) struct Ply {
     pub(crate) others: Vec<Other>,
     /// Cells that a drape has reached; absent: all.
     pub(crate) draped: Option<Vec<bool>>,
-    /// Directions of both fibre families in the flat ply (rad, from x).
-    pub(crate) fibres: Option<[f64; 2]>,
+    /// Directions of both fibre families in the flat ply.
+    pub(crate) fibres: Option<Laid>,
     /// Thickness of the flat ply (m).
     pub(crate) thickness: Option<f64>,
     /// What follows from flat and formed shape.

@@ -1,6 +1,7 @@
 //! What the flat and the formed shape of a ply tell together. `plyflow_export` computes it, as for the files of other programs.
 
 use plyflow_export::{Sheared, deviations, sheared};
+use plyflow_model::steering::Laid;
 
 /// A place in space (m).
 type Vec3 = [f64; 3];
@@ -15,20 +16,22 @@ pub(crate) struct Shape {
 }
 
 impl Shape {
-    /// Of cells with their flat and formed points. `fibres`: directions of the families (rad, from x); `thickness`: of the flat ply (m);
+    /// Of cells with their flat and formed points. `fibres`: directions of the families; `thickness`: of the flat ply (m);
     /// `draped`: which cells have a shape.
     pub(crate) fn of(
         (flat, formed): (&[Vec3], &[Vec3]),
         cells: &[[u32; 4]],
         draped: Option<&[bool]>,
-        (fibres, thickness): (Option<[f64; 2]>, Option<f64>),
+        (fibres, thickness): (Option<&Laid>, Option<f64>),
     ) -> Self {
-        let laid = fibres.unwrap_or([0.0, std::f64::consts::FRAC_PI_2]);
+        let any = Laid::Straight([0.0, std::f64::consts::FRAC_PI_2]);
+        let laid = fibres.unwrap_or(&any);
+        let in_cell = |cell: &[u32; 4]| laid.in_cell(&cell.map(|i| flat[i as usize]));
         let of = |(k, cell): (usize, &[u32; 4])| {
             let at = |points: &[Vec3]| cell.map(|i| points[i as usize]);
             let there = draped.is_none_or(|d| d[k]);
             there
-                .then(|| sheared(&at(flat), &at(formed), laid))
+                .then(|| sheared(&at(flat), &at(formed), in_cell(cell)))
                 .flatten()
         };
         let shapes: Vec<_> = cells.iter().enumerate().map(of).collect();
@@ -38,11 +41,11 @@ impl Shape {
                 .collect()
         };
         let turned = || {
-            let of = |s: &Option<Sheared>| deviations(s.as_ref()?, laid);
-            let all: Vec<_> = shapes
-                .iter()
-                .map(|s| of(s).unwrap_or([f64::NAN; 2]))
-                .collect();
+            let of = |(s, cell): (&Option<Sheared>, &[u32; 4])| {
+                let turned = s.as_ref().and_then(|s| deviations(s, in_cell(cell)));
+                turned.unwrap_or([f64::NAN; 2])
+            };
+            let all: Vec<_> = shapes.iter().zip(cells).map(of).collect();
             [0, 1].map(|family| all.iter().map(|d| d[family]).collect())
         };
         Self {

@@ -5,7 +5,8 @@ use crate::artifact::shear_limits::ShearLimits;
 use crate::artifact::zones::Zone;
 use crate::outline::{Millimetres, Point};
 use crate::regions::Stitches;
-use crate::scene::{MirrorPlane, SheetKind, first_axis};
+use crate::scene::{MirrorPlane, SheetKind};
+use crate::steering::Laid;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -141,6 +142,10 @@ pub struct Sheet {
     /// Direction of a ply's second fibres (rad).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fibre_2: Option<f64>,
+    /// Of a ply whose fibres are steered, instead of `fibre_1` and `fibre_2`: `[[x, y, angle], ..]` (m, m, rad), points of the flat ply with the direction of
+    /// its first fibres. Between them it follows as [`crate::steering`] says; the second fibres lie a quarter turn on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steering: Option<Vec<[f64; 3]>>,
     /// `[[x, y], ..]` (m), of the whole flat ply, whatever part of it the run has.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outline: Option<Vec<Point>>,
@@ -181,6 +186,7 @@ impl Sheet {
             bending_elements: None,
             fibre_1: None,
             fibre_2: None,
+            steering: None,
             outline: None,
             holes: Vec::new(),
             regions: Vec::new(),
@@ -196,15 +202,24 @@ impl Sheet {
         self.kind == SheetKind::Ply
     }
 
-    /// Directions of both fibre families in the flat ply (rad).
-    pub fn fibres(&self) -> Option<[f64; 2]> {
-        Some([self.fibre_1?, self.fibre_2?])
+    /// Tells its fibres.
+    #[must_use]
+    pub fn with_fibres(mut self, laid: &Laid) -> Self {
+        match laid {
+            Laid::Straight([first, second]) => {
+                (self.fibre_1, self.fibre_2) = (Some(*first), Some(*second));
+            }
+            Laid::Steered(field) => self.steering = Some(field.points().to_vec()),
+        }
+        self
     }
 
-    /// Direction (rad, from x) of the first of the axes in which its membrane forces are told.
-    pub fn axis(&self) -> Option<f64> {
-        let [first, second] = self.fibres()?;
-        Some(first_axis(first, second))
+    /// Directions of both fibre families in the flat ply; `None` where they are not told, or its points tell none.
+    pub fn laid(&self) -> Option<Laid> {
+        match &self.steering {
+            Some(points) => Laid::steered(points.clone()).ok(),
+            None => Some(Laid::Straight([self.fibre_1?, self.fibre_2?])),
+        }
     }
 }
 

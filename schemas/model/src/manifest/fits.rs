@@ -64,7 +64,7 @@ impl Shape {
                     of.shape.takes(item)
                 })
             }
-            Shape::Scene | Shape::SheetMaterial | Shape::Component(_) => {
+            Shape::Scene { .. } | Shape::SheetMaterial | Shape::Component(_) => {
                 met(value.is_string() || value.is_object())
             }
         }

@@ -41,6 +41,8 @@ pub(super) struct RawDeclaration {
     maximum_items: Option<u64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     order: Option<Order>,
+    #[serde(default, skip_serializing_if = "is_false")]
+    straight_fibres: bool,
 }
 
 impl RawDeclaration {
@@ -57,6 +59,7 @@ impl RawDeclaration {
             ("minimum_items", self.minimum_items.is_some()),
             ("maximum_items", self.maximum_items.is_some()),
             ("order", self.order.is_some()),
+            ("straight_fibres", self.straight_fibres),
         ];
         match present
             .iter()
@@ -150,7 +153,10 @@ impl TryFrom<RawDeclaration> for Declaration {
                 Shape::Object(raw.fields.clone().ok_or_else(|| missing("fields"))?),
                 &["fields"],
             ),
-            "scene" => (Shape::Scene, &[]),
+            "scene" => {
+                let straight_fibres = raw.straight_fibres;
+                (Shape::Scene { straight_fibres }, &["straight_fibres"])
+            }
             "sheet_material" => (Shape::SheetMaterial, &[]),
             "file" => (Shape::File, &[]),
             "element" => (Shape::Component(PluginKind::Element), &[]),
@@ -235,7 +241,10 @@ impl From<Declaration> for RawDeclaration {
                 raw.fields = Some(fields);
                 "object"
             }
-            Shape::Scene => "scene",
+            Shape::Scene { straight_fibres } => {
+                raw.straight_fibres = straight_fibres;
+                "scene"
+            }
             Shape::SheetMaterial => "sheet_material",
             Shape::File => "file",
             Shape::Component(kind) => kind.name(),

@@ -49,7 +49,7 @@ pub fn declaration(d: &Declaration) -> Value {
         }
         Shape::Map(of) => json!({"type": "object", "additionalProperties": declaration(of)}),
         Shape::Object(fields) => object(fields),
-        Shape::Scene => json!({"type": ["string", "object"]}),
+        Shape::Scene { .. } => json!({"type": ["string", "object"]}),
         Shape::SheetMaterial => json!({"type": ["string", "object"]}),
         Shape::File => json!({"type": "string"}),
         Shape::Component(kind) => component(*kind),

@@ -4,7 +4,8 @@ use crate::fault::{Fault, Path, Rule, Shown};
 use crate::outline::{ContourName, OutlineError, Region};
 use crate::process::Process;
 use crate::rules::known::Known;
-use crate::scene::{Sheet, SheetKind};
+use crate::rules::steering;
+use crate::scene::{FibreDirection, Sheet, SheetKind};
 use crate::text::is_word;
 use crate::units::si_number;
 
@@ -29,7 +30,10 @@ pub fn check(known: &Known<'_>) -> Vec<Fault> {
         match sheet.kind {
             SheetKind::Ply => {
                 size(sheet, &at, &mut found);
-                found.extend(fibres(sheet, at.key("fibre_2")));
+                match &sheet.fibre_1 {
+                    FibreDirection::Straight(_) => found.extend(fibres(sheet, at.key("fibre_2"))),
+                    FibreDirection::Steered(s) => found.extend(steering::check(sheet, s, &at)),
+                }
             }
             SheetKind::Diaphragm => diaphragm(sheet, &at, &mut found),
         }
@@ -60,7 +64,7 @@ fn diaphragm(sheet: &Sheet, at: &Path, found: &mut Vec<Fault>) {
         ("outline", sheet.outline.is_some()),
         ("holes", !sheet.holes.is_empty()),
         ("centre", sheet.centre.iter().any(|c| c.si() != 0.0)),
-        ("fibre_1", sheet.fibre_1.si() != 0.0),
+        ("fibre_1", sheet.fibre_1 != FibreDirection::default()),
         ("fibre_2", sheet.fibre_2.is_some()),
         ("regions", !sheet.regions.is_empty()),
     ] {
@@ -101,7 +105,7 @@ fn size(sheet: &Sheet, at: &Path, found: &mut Vec<Fault>) {
             _ => {}
         }
     }
-    if sheet.fibre_2.is_none() {
+    if sheet.fibre_2.is_none() && matches!(sheet.fibre_1, FibreDirection::Straight(_)) {
         found.push(needs("fibre_2", "45 deg"));
     }
     found.extend(outline(sheet, at));
@@ -138,7 +142,8 @@ fn outline(sheet: &Sheet, at: &Path) -> Option<Fault> {
 
 /// The families must cross.
 fn fibres(sheet: &Sheet, path: Path) -> Option<Fault> {
-    let (first, second) = (sheet.fibre_1.si(), sheet.fibre_2?.si());
+    sheet.fibre_2?;
+    let [first, second] = sheet.fibres()?;
     // A fibre has no sense: directions 180 deg apart are the same.
     let apart = (second - first).to_degrees().rem_euclid(180.0);
     let apart = apart.min(180.0 - apart);

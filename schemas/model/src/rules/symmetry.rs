@@ -82,15 +82,29 @@ fn beside(known: &Known<'_>, plane: MirrorPlane) -> Vec<String> {
 /// When its fibres lie askew to them.
 pub fn families(sheet: &Sheet) -> Result<Families, Fault> {
     sheet.families().ok_or_else(|| {
+        let Some([first, _]) = sheet.fibres() else {
+            return steered(sheet);
+        };
         let text = format!(
             "the fibres of sheet `{}` (fibre_1 at {}) are not their own mirror image",
             sheet.name,
-            degrees(sheet.fibre_1.si())
+            degrees(first)
         );
         Fault::text(Rule::Symmetry, Path::to("symmetry").item(0), text)
             .expected("fibres along x and y, or at 45 deg to them")
             .help("turn them, or leave out `symmetry`")
     })
+}
+
+/// A field of directions would have to be its own image between its points, too, where the triangles of an even grid are not.
+fn steered(sheet: &Sheet) -> Fault {
+    let text = format!(
+        "the fibres of sheet `{}` are steered, and a part of such a ply is not computed beside mirror planes",
+        sheet.name
+    );
+    Fault::text(Rule::Symmetry, Path::to("symmetry").item(0), text)
+        .expected("one direction for all of the ply")
+        .help("leave out `symmetry`: then the whole is computed")
 }
 
 /// Fibres that lie askew to the planes, and friction by the angle to a family that the planes exchange.

@@ -2,7 +2,9 @@
 
 mod common;
 
-use common::{FILM, ISOTROPIC, KINKED, LINEAR, TABULATED_FILM, WOVEN, ncf, of_material, sound};
+use common::{
+    CRUSHED, FILM, ISOTROPIC, KINKED, LINEAR, TABULATED_FILM, WOVEN, ncf, of_material, sound,
+};
 use plyflow_conformance::{Check, failed};
 use plyflow_kernels::fabric::Fabric;
 use plyflow_kernels::fabric_linear::FabricLinear;
@@ -39,6 +41,7 @@ fn nothing_is_found_in_the_repository_s_own_materials() {
         of_material::<FabricLinear>(LINEAR),
         of_material::<Fabric>(WOVEN),
         of_material::<Fabric>(KINKED),
+        of_material::<Fabric>(CRUSHED),
     ];
     sheets.extend(["fibre-energy", "hypoelastic"].map(|form| of_material::<Fabric>(&ncf(form))));
     for checks in sheets {

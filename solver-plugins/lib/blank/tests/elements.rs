@@ -55,6 +55,7 @@ fn held<E: Element>(mesh: &QuadMesh, to: impl Fn(Vec3) -> Vec3) -> Model {
         cells: mesh.cells.clone(),
         patches,
         axis: [1.0, 0.0, 0.0],
+        steered: None,
         layers: vec![1.0; m],
         pressed: vec![Pressed::No; m],
         least_areal_mass: vec![0.0; m],

@@ -187,6 +187,7 @@ impl Specimen {
                 cells: sheet.mesh.cells.clone(),
                 patches: sheet.mesh.patches(),
                 axis: sheet.axis,
+                steered: None,
                 layers: vec![1.0; m],
                 pressed: vec![sheet.pressed; m],
                 least_areal_mass: vec![0.0; m],

@@ -6,6 +6,7 @@ use plyflow_fixed::FixedBits;
 use plyflow_geometry::rectangle;
 use plyflow_geometry::vec3::distance;
 use plyflow_model::artifact::{Cause, DefectKind as Kind, ShearLimits, Sheet};
+use plyflow_model::steering::Laid;
 use serde::Deserialize;
 use std::f64::consts::FRAC_PI_2;
 
@@ -64,24 +65,24 @@ impl Limits {
 }
 
 /// A ply next to another one in the stack.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Neighbour<'a> {
     /// It counts where its flat mesh lies.
     pub ply: &'a Ply,
-    /// Directions of both its fibre families in the flat ply (rad).
-    pub fibres: [f64; 2],
+    /// Directions of both its fibre families in the flat ply.
+    pub laid: Laid,
 }
 
 /// Places on the side of a cell lie in it, however they were rounded (m).
 const ROUNDING: f64 = 1e-6;
 
-/// Sets the causes of a ply's wrinkles. `fibres`: directions of both fibre families of the flat ply (rad); `others`:
-/// the plies next to it, of which each counts for the wrinkles under or over which it lies: its flat mesh holds a node of the crest. A scan, of which neither is known, gives both empty: its wrinkles come from bridging or
+/// Sets the causes of a ply's wrinkles. `laid`: directions of both fibre families of the flat ply; `others`:
+/// the plies next to it, of which each counts for the wrinkles under or over which it lies with fibres askew: its flat mesh holds a node of the crest. A scan, of which neither is known, gives both empty: its wrinkles come from bridging or
 /// are undetermined.
 pub fn find_causes(
     ply: &Ply,
     defects: &mut [Defect],
-    fibres: Option<[f64; 2]>,
+    laid: Option<&Laid>,
     others: &[Neighbour<'_>],
     limits: &Limits,
 ) {
@@ -89,14 +90,17 @@ pub fn find_causes(
         .filter(|d| d.kind == Kind::Bridging)
         .flat_map(|d| d.nodes.iter().copied())
         .collect();
-    let crossing: Vec<&Ply> = (others.iter())
-        .filter(|o| fibres.is_some_and(|own| relative_angle(own, o.fibres) > limits.layup_angle))
-        .map(|o| o.ply)
-        .collect();
     let crossed = |ridge: &[u32]| {
         let flat = |&i: &u32| [0, 1].map(|k| ply.undeformed[i as usize][k]);
-        let places: Vec<[f64; 2]> = ridge.iter().map(flat).collect();
-        crossing.iter().any(|other| lies_at(other, &places))
+        others.iter().any(|other| {
+            let askew = |p: &[f64; 2]| {
+                laid.is_some_and(|own| {
+                    relative_angle(own.at(*p), other.laid.at(*p)) > limits.layup_angle
+                })
+            };
+            let places: Vec<[f64; 2]> = ridge.iter().map(flat).filter(askew).collect();
+            !places.is_empty() && lies_at(other.ply, &places)
+        })
     };
     let wrinkles = defects.iter_mut().filter(|d| d.kind == Kind::Wrinkle);
     for wrinkle in wrinkles {

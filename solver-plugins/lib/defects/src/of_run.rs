@@ -12,8 +12,8 @@ use plyflow_surface::{Ground, Topology, of_run};
 pub fn neighbours<'a>(sheets: &[Sheet], plies: &'a [Ply], k: usize) -> Vec<Neighbour<'a>> {
     let next = [k.checked_sub(1), Some(k + 1)].into_iter().flatten();
     next.filter_map(|i| {
-        let (ply, fibres) = (plies.get(i)?, sheets.get(i)?.fibres()?);
-        Some(Neighbour { ply, fibres })
+        let (ply, laid) = (plies.get(i)?, sheets.get(i)?.laid()?);
+        Some(Neighbour { ply, laid })
     })
     .collect()
 }

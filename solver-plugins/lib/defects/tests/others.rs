@@ -6,6 +6,7 @@ use common::*;
 use plyflow_defects::scan::join;
 use plyflow_defects::{Cause, Limits, Neighbour, Ply, Shape, Tool, find_causes, measure};
 use plyflow_geometry::vec3::{Vec3, distance};
+use plyflow_model::steering::Laid;
 use plyflow_surface::{Ground, Surface, Topology, triangles};
 use std::f64::consts::PI;
 
@@ -178,10 +179,16 @@ fn causes_follow_from_the_fields() {
         let mut found = all(ply);
         let with = |fibres: &[f64; 2]| Neighbour {
             ply: other,
-            fibres: *fibres,
+            laid: Laid::Straight(*fibres),
         };
         let others: Vec<Neighbour<'_>> = others.iter().map(with).collect();
-        find_causes(ply, &mut found, Some(own), &others, &limits(reach));
+        find_causes(
+            ply,
+            &mut found,
+            Some(&Laid::Straight(own)),
+            &others,
+            &limits(reach),
+        );
         assert_eq!(found[1].cause, None);
         found[0].cause.unwrap()
     };
@@ -199,6 +206,28 @@ fn causes_follow_from_the_fields() {
     // A ply that lies beside the wrinkle does nothing to it.
     let alone = cause_under(&ply, &beside, &turned, 0.02);
     assert_eq!(alone, Cause::FibreCompression);
+    // Of a steered ply the direction at the wrinkle counts, which lies at x < 0, and not that beside it.
+    let steered = |there: f64, beside: f64| {
+        let points = [
+            (-0.08, there),
+            (-0.001, there),
+            (0.001, beside),
+            (0.08, beside),
+        ];
+        let laid = Laid::steered(points.map(|(x, angle)| [x, 0.0, angle]).to_vec()).unwrap();
+        let mut found = all(&ply);
+        let other = Neighbour { ply: &around, laid };
+        find_causes(
+            &ply,
+            &mut found,
+            Some(&Laid::Straight(own)),
+            &[other],
+            &limits(0.02),
+        );
+        found[0].cause.unwrap()
+    };
+    assert_eq!(steered(0.0, own[0]), Cause::InterPlyCompression);
+    assert_eq!(steered(own[0], 0.0), Cause::FibreCompression);
     // The same directions, named the other way round and turned by half a turn: one layup, pressed together by itself.
     assert_eq!(
         cause(&ply, &[[PI / 4.0, 0.75 * PI]], 0.02),

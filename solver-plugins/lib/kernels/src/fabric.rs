@@ -3,7 +3,8 @@
 //! With the stretches l1 = sqrt(C11), l2 = sqrt(C22) and s = sin g = C12 / (l1 l2) the form
 //! `fibre-energy` is
 //!
-//! `W = k1/2 (l1 - 1)^2 + k2/2 (l2 - 1)^2 + Phi(s)`, `dPhi/ds = F_norm(g)`, `k = fibre_modulus * thickness` of each family:
+//! `W = k1/2 (l1 - 1)^2 + k2/2 (l2 - 1)^2 + Phi(s)`, `dPhi/ds = F_norm(g)`, `k = fibre_modulus * thickness` of each family
+//! (in compression a share of it, or instead the integral of a curve over `1 - l`, [`compression`]):
 //!
 //! a picture frame does the work `F_norm cos g dg = F_norm ds` per undeformed area, so this energy
 //! gives back the measured curve exactly. `hypoelastic` is the thesis' incremental form (eqs
@@ -12,6 +13,7 @@
 
 mod bending;
 mod checks;
+mod compression;
 mod cubic;
 mod fibre_energy;
 mod hypoelastic;
@@ -102,19 +104,19 @@ fn membrane_kernel<V: Lanes>(
     let stitch = f.shear.stitch.as_ref();
     // Compiled for each kind of yarns and each form.
     macro_rules! of_yarn {
-        ($yarn:expr, $slides:literal) => {{
+        ($yarn:expr, $more:literal) => {{
             let law = ShearOf {
                 yarn: $yarn,
                 stitch,
             };
             match f.form {
                 Form::FibreEnergy => {
-                    fibre_energy::membrane::<V, _, $slides>(
+                    fibre_energy::membrane::<V, _, $more>(
                         f, law, n, metric, history, stress, energy, stiffness,
                     );
                 }
                 Form::Hypoelastic => {
-                    hypoelastic::membrane::<V, _, $slides>(
+                    hypoelastic::membrane::<V, _, $more>(
                         f, law, n, metric, history, stress, energy, stiffness,
                     );
                 }
@@ -124,7 +126,9 @@ fn membrane_kernel<V: Lanes>(
     match &f.shear.yarn {
         Yarn::Polynomial(yarn) => of_yarn!(&**yarn, false),
         Yarn::Table(yarn) => of_yarn!(yarn, false),
-        Yarn::Signed(yarn) if f.shear.slider.is_some() => of_yarn!(&**yarn, true),
+        Yarn::Signed(yarn) if f.shear.slider.is_some() || f.crush.is_some() => {
+            of_yarn!(&**yarn, true);
+        }
         Yarn::Signed(yarn) => of_yarn!(&**yarn, false),
     }
 }

@@ -67,6 +67,8 @@ pub struct SheetSpec {
     pub patches: Vec<Patch>,
     /// Direction of material axis e1 in the undeformed plane.
     pub axis: [f64; 3],
+    /// Of a sheet whose axes depend on the place: theirs, instead of `axis`.
+    pub steered: Option<SteeredAxes>,
     /// `[m]` how many layers a cell stands for (2 where two films are joined).
     pub layers: Vec<f64>,
     /// `[m]` what presses on it.
@@ -79,6 +81,23 @@ pub struct SheetSpec {
     pub elsewhere: Option<Elsewhere>,
     /// Another material that some cells have, if any do.
     pub other_material: Option<OtherMaterial>,
+}
+
+/// Directions of material axis e1 in the undeformed plane, by place. An axis has no head: neighbours may have opposite ones.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SteeredAxes {
+    /// `[m]` in the middle of each cell.
+    pub cells: Vec<[f64; 3]>,
+    /// `[nodes]` at each mesh node, for the patch around it.
+    pub nodes: Vec<[f64; 3]>,
+}
+
+impl SheetSpec {
+    /// Direction of e1 of the patch around a mesh-local node.
+    pub(crate) fn axis_of_patch(&self, centre: u32) -> [f64; 3] {
+        let of = |s: &SteeredAxes| s.nodes[centre as usize];
+        self.steered.as_ref().map_or(self.axis, of)
+    }
 }
 
 /// The same formulation with another material in some cells of a sheet, such as a fabric without its stitch. What bends about nodes is that of the

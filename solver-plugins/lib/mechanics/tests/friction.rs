@@ -19,6 +19,7 @@ use std::sync::Arc;
 fn sheet(name: &str, mesh: &QuadMesh, first: u32, axis: Vec3, pressed: Pressed) -> SheetSpec {
     SheetSpec {
         axis,
+        steered: None,
         pressed: vec![pressed; mesh.cells.len()],
         ..common::sheet(name, mesh, first, common::membrane())
     }

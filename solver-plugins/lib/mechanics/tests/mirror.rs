@@ -231,6 +231,7 @@ fn troughs(planes: Planes) -> (Model, Vec<Vec3>) {
         );
         specs.push(SheetSpec {
             axis: [0.0, 1.0, 0.0],
+            steered: None,
             ..common::sheet("trough", mesh, first, common::membrane())
         });
     }

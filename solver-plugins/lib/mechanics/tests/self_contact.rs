@@ -50,6 +50,7 @@ impl Strip {
             patches: Vec::new(),
             // Across the strip: in the plane of every cell.
             axis: [0.0, 1.0, 0.0],
+            steered: None,
             layers: vec![1.0; mesh.cells.len()],
             least_areal_mass: vec![0.0; mesh.cells.len()],
             element: self.element,

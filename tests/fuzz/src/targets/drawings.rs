@@ -1,11 +1,12 @@
-//! Outlines of plies, and ply books.
+//! Outlines of plies, directions of their fibres, and ply books.
 
 use super::workflows::load;
 use crate::fixture::Folder;
 use plyflow_files::dxf::{Contours, Fineness};
 use plyflow_files::flaw::{Flaw, plain};
-use plyflow_files::{book, drawn};
+use plyflow_files::{book, drawn, steered};
 use plyflow_model::outline::Region;
+use plyflow_model::steering::{SteeredField, SteeringError};
 use std::fmt::Write;
 
 thread_local! {
@@ -79,4 +80,35 @@ pub(super) fn book(bytes: &[u8]) {
         let path = folder.write("plies.csv", bytes);
         load(folder, "workflow-plies.yaml", &path, bytes);
     });
+}
+
+/// The bytes as a table of fibre directions: what it gives tells a direction everywhere, which at its points is theirs.
+pub(super) fn steering(bytes: &[u8]) {
+    let Ok(text) = plain(bytes) else { return };
+    for unit in [None, Some("mm")] {
+        let rows = match steered::read(&text, unit) {
+            Ok(rows) => rows,
+            Err(flaws) => {
+                told(&flaws, &text);
+                continue;
+            }
+        };
+        let points: Vec<[f64; 3]> = rows
+            .iter()
+            .map(|r| [r.place[0].si, r.place[1].si, r.angle.si])
+            .collect();
+        match SteeredField::new(points.clone()) {
+            Ok(field) => {
+                for [x, y, _] in &points {
+                    assert!(field.angle_at([*x, *y]).is_finite(), "{x} {y}");
+                }
+                assert!(field.angle_at([1e3, -1e3]).is_finite());
+                let turn = field.sharp_turn(None);
+                assert!(turn.is_none_or(|t| t.first < t.second && t.second < points.len()));
+            }
+            Err(SteeringError::Same { first, second, .. }) => assert!(first < second),
+            Err(SteeringError::NoNumber(k)) => assert!(k < points.len()),
+            Err(other) => panic!("{other}"),
+        }
+    }
 }

@@ -60,7 +60,7 @@ impl Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 22] = [
+pub const TARGETS: [Target; 23] = [
     Target::of_text("workflow", workflows::workflow),
     Target::of_text("scene", workflows::scene),
     Target::of_text("material", workflows::material),
@@ -69,6 +69,7 @@ pub const TARGETS: [Target; 22] = [
     Target::of_text("override", workflows::overrides),
     Target::of_text("ply-book", drawings::book),
     Target::of_text("drawing", drawings::drawing),
+    Target::of_text("steering", drawings::steering),
     Target::of_bytes("quantity", words::quantity),
     Target::of_bytes("expression", words::expression),
     Target::of_text("table", tables::table),

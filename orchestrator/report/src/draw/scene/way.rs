@@ -105,7 +105,7 @@ impl<'a> Way<'a> {
 fn at(ply: &Ply, frame: &Frame, k: usize) -> Ply {
     let now = &frame.plies[k];
     let draped = ply.draped.as_deref();
-    let told = (ply.fibres, ply.thickness);
+    let told = (ply.fibres.as_ref(), ply.thickness);
     Ply {
         shape: PlyShape::of((&ply.flat, &now.formed), &ply.cells, draped, told),
         flat: ply.flat.clone(),

@@ -80,13 +80,16 @@ fn constants(with: &Value) -> Vec<(&'static str, String)> {
             v => format!("{} GPa", number(v * 1e-9, 4)),
         })
     };
+    // Where nothing is said of it, fibres are as stiff as in tension.
+    let plain = ["compression", "compression_2"]
+        .iter()
+        .all(|k| with[*k].is_null());
+    let share =
+        of("compression_factor").or((plain && of("fibre_modulus").is_some()).then_some(1.0));
     let all = [
         ("Modulus along the fibres", modulus("fibre_modulus")),
         ("Modulus of the second family", modulus("fibre_modulus_2")),
-        (
-            "Share of it in compression",
-            of("compression_factor").map(|v| number(v, 4)),
-        ),
+        ("Share of it in compression", share.map(|v| number(v, 4))),
         ("Young's modulus", modulus("youngs_modulus")),
     ];
     all.into_iter()
@@ -180,7 +183,31 @@ fn fabric(with: &Value) -> Vec<Plot<'static>> {
         "moment per width (N)",
         bending(&with["bending"]),
     ));
+    plots.extend(plot(
+        "Fibres in compression",
+        "compressive strain (%)",
+        "stress (MPa)",
+        compression(with),
+    ));
     plots
+}
+
+/// Stress over strain of fibres that follow a curve in compression, by family where there are two.
+fn compression(with: &Value) -> Vec<Series<'static>> {
+    let of = |key: &str| {
+        let table = &with[key]["table"];
+        let (x, y) = (list(&table["strains"]), list(&table["stresses"]));
+        let x: Vec<f64> = x.iter().map(|e| 100.0 * e).collect();
+        let y: Vec<f64> = y.iter().map(|s| 1e-6 * s).collect();
+        (!x.is_empty() && x.len() == y.len()).then_some((x, y))
+    };
+    let (first, second) = (of("compression"), of("compression_2"));
+    // A family with a share of its modulus is told in words.
+    let both = second.is_none() && with["compression_factor_2"].is_null();
+    let name = if both { "both families" } else { "family 1" };
+    let first = first.map(|curve| series(name, 0, Style::Line, curve));
+    let second = second.map(|curve| series("family 2", 1, Style::Line, curve));
+    first.into_iter().chain(second).collect()
 }
 
 /// Angles in degrees; for negative shear both change their signs.

@@ -3,8 +3,10 @@
 use crate::draw::{px, spot};
 use crate::units::{number, quantity};
 use maud::{Markup, html};
+use plyflow_export::{Field, pieces};
 use plyflow_model::artifact::Sheet;
-use plyflow_model::outline::{Point, signed_area};
+use plyflow_model::outline::{Point, Region, signed_area};
+use plyflow_model::steering::Laid;
 
 /// Width on the page of the largest ply (px), and the most of its height.
 const ROOM: [f64; 2] = [330.0, 250.0];
@@ -49,8 +51,15 @@ pub(super) fn sketches(sheets: &[Sheet]) -> Markup {
     let mut all: Vec<(&Sheet, Vec<&str>)> = Vec::new();
     for sheet in sheets.iter().filter(|s| s.is_ply() && s.outline.is_some()) {
         let alike = |(s, _): &&mut (&Sheet, Vec<&str>)| {
-            (&s.outline, &s.holes, &s.regions, s.fibres())
-                == (&sheet.outline, &sheet.holes, &sheet.regions, sheet.fibres())
+            let flat = |s: &Sheet| (s.fibre_1, s.fibre_2);
+            (&s.outline, &s.holes, &s.regions, &s.steering, flat(s))
+                == (
+                    &sheet.outline,
+                    &sheet.holes,
+                    &sheet.regions,
+                    &sheet.steering,
+                    flat(sheet),
+                )
         };
         match all.iter_mut().find(alike) {
             Some((_, names)) => names.push(&sheet.name),
@@ -81,14 +90,16 @@ fn sketch(sheet: &Sheet, names: &[&str], scale: f64) -> Markup {
     let [left, top, right, below] = AROUND;
     let (w, h) = ((b[2] - b[0]) * scale, (b[3] - b[1]) * scale);
     let page = |p: Point| [left + (p[0] - b[0]) * scale, top + (b[3] - p[1]) * scale];
-    let path = |line: &[Point]| -> String {
+    let open = |line: &[Point]| -> String {
         let mut text = String::new();
         for (i, p) in line.iter().enumerate() {
             text += if i == 0 { "M" } else { "L" };
             text += &spot(page(*p));
         }
-        text + "Z"
+        text
     };
+    let path = |line: &[Point]| open(line) + "Z";
+    let laid = sheet.laid();
     let whole: String = std::iter::once(outline)
         .chain(sheet.holes.iter().map(Vec::as_slice))
         .map(path)
@@ -108,12 +119,49 @@ fn sketch(sheet: &Sheet, names: &[&str], scale: f64) -> Markup {
                     @let at = page(centre(&region.outline));
                     text class="tick" x=(px(at[0])) y=(px(at[1] + 4.0)) text-anchor="middle" { (region.name) }
                 }
-                @for (family, angle) in sheet.fibres().into_iter().flatten().enumerate() { (direction(page(middle), w.min(h), family, angle)) }
+                @if let Some(Laid::Straight(fibres)) = &laid {
+                    @for (family, angle) in fibres.iter().enumerate() { (direction(page(middle), w.min(h), family, *angle)) }
+                }
+                @if let Some(laid @ Laid::Steered(_)) = &laid {
+                    @for family in 0..2 {
+                        path class=(format!("line c{family}")) d=(curves(sheet, laid, family).iter().map(|l| open(l)).collect::<String>()) {}
+                    }
+                }
                 (dimensions([left, top, w, h], b))
             }
             figcaption { (names.join(", ")) @for r in &sheet.regions { "; " (r.name) ": " (region_text(r)) } }
         }
     }
+}
+
+/// Places across the longer side of a ply that curves are begun from.
+const PLACES: usize = 40;
+/// Curves of a family across the longer side of a ply, about.
+const CURVES: f64 = 9.0;
+
+/// Lines of a family of steered fibres on the flat ply (m).
+fn curves(sheet: &Sheet, laid: &Laid, family: usize) -> Vec<Vec<Point>> {
+    let region = Region {
+        outline: sheet.outline.clone().unwrap_or_default(),
+        holes: sheet.holes.clone(),
+    };
+    let [x0, y0, x1, y1] = bounds(&region.outline);
+    let room = (x1 - x0).max(y1 - y0);
+    let at = |i: usize, low: f64| low + room * (i as f64 + 0.5) / PLACES as f64;
+    let all = (0..PLACES).flat_map(|i| (0..PLACES).map(move |j| [at(i, x0), at(j, y0)]));
+    let mut places: Vec<Point> = all.filter(|p| region.contains(*p)).collect();
+    let off = |p: &Point| (p[0] - 0.5 * (x0 + x1)).hypot(p[1] - 0.5 * (y0 + y1));
+    places.sort_by(|a, b| off(a).total_cmp(&off(b)));
+    let field = Field {
+        laid,
+        scale: 1.0,
+        step: room / 150.0,
+        inside: &|p| region.contains(p),
+        places: &places,
+    };
+    let found = field.curves(family, room / CURVES).unwrap_or_default();
+    let inside = |p: Point| region.contains(p).then_some(p);
+    found.iter().flat_map(|c| pieces(c, inside)).collect()
 }
 
 fn centre(line: &[Point]) -> Point {
@@ -161,5 +209,71 @@ fn dimensions([left, top, w, h]: [f64; 4], b: [f64; 4]) -> Markup {
         path class="axis" d={ "M" (px(x - 4.0)) " " (px(top)) "h8M" (px(x - 4.0)) " " (px(top + h)) "h8M" (px(x)) " " (px(top)) "v" (px(h)) } {}
         text class="tick" x=(px(x - 8.0)) y=(px(middle)) text-anchor="middle" transform={ "rotate(-90 " (px(x - 8.0)) " " (px(middle)) ")" } {
             (mm(b[3] - b[1])) " (y " (mm(b[1])) " … " (mm(b[3])) ")" }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use plyflow_model::scene::SheetKind;
+
+    /// A ply of 200 x 100 mm with a hole, whose fibres lie on circles about (-0.15, 0) m.
+    fn steered() -> Sheet {
+        let corner = |x: f64, y: f64| [0.1 * x, 0.05 * y];
+        let at = |k: i32| f64::from(k) * 0.01;
+        let places = (-11..=11).flat_map(|i| (-6..=6).map(move |j| [at(i), at(j)]));
+        let across = std::f64::consts::FRAC_PI_2;
+        let points = places.map(|[x, y]| [x, y, y.atan2(x + 0.15) + across]);
+        Sheet {
+            outline: Some(vec![
+                corner(-1.0, -1.0),
+                corner(1.0, -1.0),
+                corner(1.0, 1.0),
+                corner(-1.0, 1.0),
+            ]),
+            holes: vec![vec![[0.0, 0.0], [0.0, 0.02], [0.02, 0.02], [0.02, 0.0]]],
+            steering: Some(points.collect()),
+            ..Sheet::new("ply_1", SheetKind::Ply, 4e-4, 2e-4)
+        }
+    }
+
+    #[test]
+    fn curves_of_a_steered_ply_follow_its_fibres_and_stay_on_it() {
+        let sheet = steered();
+        let laid = sheet.laid().unwrap();
+        for family in 0..2 {
+            let lines = curves(&sheet, &laid, family);
+            assert!(lines.len() > 5, "{}", lines.len());
+            for line in &lines {
+                let polar = |p: &Point| [(p[0] + 0.15).hypot(p[1]), p[1].atan2(p[0] + 0.15)];
+                let tolerance = [0.02 * polar(&line[0])[0], 0.02][family];
+                for p in line {
+                    assert!(p[0].abs() < 0.1 + 1e-9 && p[1].abs() < 0.05 + 1e-9, "{p:?}");
+                    let in_hole = [0, 1].iter().all(|d| (1e-6..0.02 - 1e-6).contains(&p[*d]));
+                    assert!(!in_hole, "{p:?}");
+                    // On a circle the radius stays, on a ray the angle.
+                    let off = polar(p)[family] - polar(&line[0])[family];
+                    assert!(off.abs() < tolerance, "family {family}: {off}");
+                }
+            }
+        }
+        let drawn = sketches(&[
+            sheet.clone(),
+            Sheet {
+                name: "ply_2".into(),
+                ..sheet
+            },
+        ])
+        .into_string();
+        assert!(drawn.contains("line c0") && drawn.contains("line c1"));
+        assert!(
+            drawn.contains("ply_1, ply_2"),
+            "alike in all, and drawn once"
+        );
+        let mut other = steered();
+        other.steering.as_mut().unwrap()[0][2] += 0.1;
+        other.name = "ply_2".into();
+        let drawn = sketches(&[steered(), other]).into_string();
+        assert!(!drawn.contains("ply_1, ply_2"));
     }
 }

@@ -52,6 +52,14 @@ pub const KINKED: &str = r#"{"form": "fibre-energy", "fibre_modulus": 3e9, "comp
                 "negative": {"linear": 1e-4, "asymptote": 0.03, "scale": 6.0}, "families": "opposite"},
     "thickness": 4e-4, "areal_mass": 0.44}"#;
 
+/// Fibres that buckle within the ply, of a curve for each family; rubbing yarns beside them.
+pub const CRUSHED: &str = r#"{"form": "fibre-energy", "fibre_modulus": 3e9,
+    "compression": {"table": {"strains": [0.0, 0.001, 0.003, 0.01, 0.05], "stresses": [0.0, 3e6, 4.5e6, 5e6, 5.2e6]}},
+    "compression_2": {"table": {"strains": [0.0, 0.002, 0.02], "stresses": [0.0, 1e6, 3e6]}},
+    "shear": {"coefficients": [0.0, 112.19, 94.73], "limit": 0.8, "hysteresis": {"force": 8.0, "angle": 0.05, "per_tension": 1e-3}},
+    "bending": {"positive": {"linear": 1e-4, "asymptote": 0.03, "scale": 6.0}},
+    "thickness": 4e-4, "areal_mass": 0.44}"#;
+
 /// Checks of a material.
 pub fn of_material<M: Material>(parameters: &str) -> Vec<Check> {
     let table = material_table::<M>();

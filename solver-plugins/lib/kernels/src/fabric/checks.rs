@@ -73,10 +73,19 @@ pub(super) const MOMENT: Columns = Columns {
     value_unit: "N",
 };
 
+const COMPRESSION: Columns = Columns {
+    at: "strains",
+    at_unit: "1",
+    value: "stresses",
+    value_unit: "Pa",
+};
+
 impl Columns {
     fn place(&self, x: f64) -> String {
         if self.at_unit == "rad" {
             angle(x)
+        } else if self.at_unit == "1" {
+            format!("{x} ({} %)", 100.0 * x)
         } else {
             format!("{x} {} ({} 1/mm)", self.at_unit, x / 1000.0)
         }
@@ -227,6 +236,49 @@ pub(super) fn moment_table(path: &str, x: &[f64], y: &[f64]) -> Result<(), Strin
         ));
     }
     Ok(())
+}
+
+/// A curve of compression: strains (1) and stresses (Pa), both as sizes, of fibres with the modulus `modulus` (Pa) in tension.
+pub(super) fn compression_table(
+    path: &str,
+    x: &[f64],
+    y: &[f64],
+    modulus: f64,
+) -> Result<(), String> {
+    table(path, &COMPRESSION, x, y)?;
+    let last = x.len() - 1;
+    if x[last] >= 1.0 {
+        return Err(format!(
+            "{path}.strains[{last}]: given {}; expected less than 1, at which nothing of the length is left: strains are shares (2 % is 0.02)",
+            COMPRESSION.place(x[last])
+        ));
+    }
+    if y[1] <= 0.0 {
+        return Err(format!(
+            "{path}.stresses[1]: given {} Pa at {}; expected a stress above 0 (sizes): fibres without any stiffness in compression have              no stable straight state",
+            y[1],
+            COMPRESSION.place(x[1])
+        ));
+    }
+    if let Some(i) = first_fall(y, false) {
+        return Err(format!(
+            "{path}.stresses[{i}]: given {} Pa at {} after {} Pa; expected stresses that do not fall: compression would gather in one row of \
+             elements, and the answer depend on the mesh. Smooth the data, or end the table before it falls (the law goes on along its tangent)",
+            y[i],
+            COMPRESSION.place(x[i]),
+            y[i - 1]
+        ));
+    }
+    let slope = |i: usize| (y[i] - y[i - 1]) / (x[i] - x[i - 1]);
+    match (1..x.len()).find(|i| slope(*i) > modulus * (1.0 + 1e-9)) {
+        Some(i) => Err(format!(
+            "{path}.stresses[{i}]: given {} Pa at {}, which rises by {} Pa for each strain; expected at most the modulus in tension, {modulus} Pa: fibres              are not stiffer in compression. Check the units",
+            y[i],
+            COMPRESSION.place(x[i]),
+            slope(i)
+        )),
+        None => Ok(()),
+    }
 }
 
 /// A shear polynomial and its limit angle (rad).

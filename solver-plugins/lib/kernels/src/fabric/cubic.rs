@@ -110,6 +110,27 @@ impl Cubic {
         }
     }
 
+    /// The largest slope of all.
+    pub(super) fn steepest(&self) -> f64 {
+        let starts = |i: usize| self.pieces.get(i).map_or(f64::INFINITY, |p| p.0[0]);
+        let pieces = self.pieces.iter().enumerate();
+        let pieces = pieces.take_while(|(_, p)| p.0[0].is_finite());
+        let within = pieces.map(|(i, p)| {
+            let [x, _, c1, c2, c3, ..] = p.0;
+            let h = starts(i + 1).min(self.end) - x;
+            let at = |t: f64| c1 + t * (2.0 * c2 + 3.0 * c3 * t);
+            // A slope is a parabola of the place.
+            let top = -c2 / (3.0 * c3);
+            let top = if top > 0.0 && top < h {
+                at(top)
+            } else {
+                at(0.0)
+            };
+            at(0.0).max(at(h)).max(top)
+        });
+        within.fold(self.end_slope, f64::max)
+    }
+
     /// Slope at 0.
     pub(super) fn start_slope(&self) -> f64 {
         self.pieces[0].0[2]
@@ -227,6 +248,25 @@ mod tests {
         }
         let end = at(&c, c.end);
         assert!((end.0 - c.end_value).abs() < 1e-12 && (end.1 - c.end_slope).abs() < 1e-10);
+    }
+
+    #[test]
+    fn no_slope_is_larger_than_the_steepest_which_is_met() {
+        for n in [2, 3, 5, 20, 64] {
+            let (x, y) = rough(n);
+            let c = Cubic::new(&x, &y);
+            let places = (0..=100_000).map(|i| c.end * f64::from(i) / 100_000.0);
+            let largest = places.map(|t| at(&c, t).1).fold(0.0, f64::max);
+            let steepest = c.steepest();
+            assert!(
+                largest <= steepest * (1.0 + 1e-12),
+                "{n}: {largest} {steepest}"
+            );
+            assert!(
+                largest > steepest * (1.0 - 1e-3),
+                "{n}: {largest} {steepest}"
+            );
+        }
     }
 
     #[test]

@@ -8,11 +8,11 @@ use crate::{Lanes, WIDTH};
 /// Rows of history with a stitch: largest shear angle, its sine. Those of a slider follow, and then the stitch's are there in any case.
 pub(super) const HISTORY: usize = 2;
 
-/// Stresses and energies from the metric; the history is that of the stitch, `stiffness` may be empty. `SLIDES`: whether yarns rub, which
-/// is known when it is compiled, as the test for it would cost the others a tenth of their time.
+/// Stresses and energies from the metric; the history is that of the stitch, `stiffness` may be empty. `MORE`: whether yarns may rub, or fibres
+/// follow a curve in compression, which is known when it is compiled, as the tests for it would cost the others a tenth of their time.
 /// Long, as it is the loop of a kernel: pieces of it would share most of its values, and its speed would hang on how they are inlined.
 #[inline(always)]
-pub(super) fn membrane<V: Lanes, L: Law, const SLIDES: bool>(
+pub(super) fn membrane<V: Lanes, L: Law, const MORE: bool>(
     f: &Fabric,
     law: ShearOf<'_, L>,
     n: usize,
@@ -25,6 +25,7 @@ pub(super) fn membrane<V: Lanes, L: Law, const SLIDES: bool>(
     let (one, half) = (V::splat(1.0), V::splat(0.5));
     let [tension_1, tension_2] = f.tension.map(V::splat);
     let [compression_1, compression_2] = f.compression.map(V::splat);
+    let [stiffest_1, stiffest_2] = f.stiffest.map(V::splat);
     for c in (0..n).step_by(WIDTH) {
         let c11 = V::load(metric, c).max(V::splat(LEAST));
         let c22 = V::load(metric, n + c).max(V::splat(LEAST));
@@ -36,6 +37,14 @@ pub(super) fn membrane<V: Lanes, L: Law, const SLIDES: bool>(
         let zero = V::splat(0.0);
         let k1 = V::select(d1.lt(zero), compression_1, tension_1);
         let k2 = V::select(d2.lt(zero), compression_2, tension_2);
+        let (mut n1, mut n2) = (k1 * d1, k2 * d2);
+        let mut fibres = half * (n1 * d1 + n2 * d2);
+        if MORE && let Some([crush_1, crush_2]) = &f.crush {
+            let ((m1, w1), (m2, w2)) = (crush_1.at(d1), crush_2.at(d2));
+            let of = |d: V, crushed: V, pulled: V| V::select(d.lt(zero), crushed, pulled);
+            fibres = of(d1, w1, half * n1 * d1) + of(d2, w2, half * n2 * d2);
+            (n1, n2) = (of(d1, m1, n1), of(d2, m2, n2));
+        }
         let rr = r1 * r2;
         let s = c12 * rr;
         let mut shear = if law.stitch.is_some() {
@@ -47,8 +56,8 @@ pub(super) fn membrane<V: Lanes, L: Law, const SLIDES: bool>(
         } else {
             law.yarn(s)
         };
-        if SLIDES && let Some(slider) = &f.shear.slider {
-            let tension = (k1 * d1).max(zero) + (k2 * d2).max(zero);
+        if MORE && let Some(slider) = &f.shear.slider {
+            let tension = n1.max(zero) + n2.max(zero);
             let row = |r: usize| (HISTORY + r) * n + c;
             let (stands, lost) = (V::load(history, row(0)), V::load(history, row(1)));
             let slid = slider.at(s, tension, stands, lost);
@@ -58,16 +67,17 @@ pub(super) fn membrane<V: Lanes, L: Law, const SLIDES: bool>(
             shear.energy = shear.energy + slid.energy;
         }
         let fs = shear.force * s;
-        (k1 * d1 * r1 - fs * i1).store(stress, c);
-        (k2 * d2 * r2 - fs * i2).store(stress, n + c);
+        (n1 * r1 - fs * i1).store(stress, c);
+        (n2 * r2 - fs * i2).store(stress, n + c);
         (shear.force * rr).store(stress, 2 * n + c);
-        (half * (k1 * d1 * d1 + k2 * d2 * d2) + shear.energy).store(energy, c);
+        (fibres + shear.energy).store(energy, c);
         if !stiffness.is_empty() {
             let mut slope = law.slopes(s).0;
-            if SLIDES && let Some(slider) = &f.shear.slider {
+            if MORE && let Some(slider) = &f.shear.slider {
                 slope = slope + V::splat(slider.stiffness);
             }
-            let (a1, a2) = (tension_1 * i1 * r1, tension_2 * i2 * r2);
+            // Of a curve N(e), dS/dE = (N' l + N) / l^3: at most its largest slope over l^3, as N is at most that times e = 1 - l.
+            let (a1, a2) = (stiffest_1 * i1 * r1, stiffest_2 * i2 * r2);
             let (largest, soft) = tangents(slope, s, i1, i2, a1, a2, shear.force.abs());
             largest.store(stiffness, c);
             soft.store(stiffness, n + c);

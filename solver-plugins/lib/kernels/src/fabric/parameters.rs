@@ -2,6 +2,7 @@
 
 use super::bending::{Bending, Law, Laws, Voce};
 use super::checks::{self, not_negative, positive};
+use super::compression::Crush;
 use super::cubic::Cubic;
 use super::hysteresis::Slider;
 use super::ply::{Fabric, Form};
@@ -18,14 +19,28 @@ pub(super) struct Parameters {
     form: Form,
     fibre_modulus: f64,
     fibre_modulus_2: Option<f64>,
-    #[serde(default = "one")]
-    compression_factor: f64,
+    compression_factor: Option<f64>,
     compression_factor_2: Option<f64>,
+    compression: Option<CompressionParameters>,
+    compression_2: Option<CompressionParameters>,
     shear: ShearParameters,
     stitch: Option<StitchParameters>,
     bending: Option<BendingParameters>,
     thickness: f64,
     areal_mass: f64,
+}
+
+#[derive(Deserialize, Clone)]
+#[serde(deny_unknown_fields)]
+struct CompressionParameters {
+    table: CompressionTable,
+}
+
+#[derive(Deserialize, Clone)]
+#[serde(deny_unknown_fields)]
+struct CompressionTable {
+    strains: Vec<f64>,
+    stresses: Vec<f64>,
 }
 
 #[derive(Deserialize)]
@@ -148,32 +163,19 @@ fn fibre_energy() -> Form {
     Form::FibreEnergy
 }
 
-fn one() -> f64 {
-    1.0
-}
-
 impl Parameters {
     pub(super) fn build(self) -> Result<Fabric, String> {
         let moduli = [
             self.fibre_modulus,
             self.fibre_modulus_2.unwrap_or(self.fibre_modulus),
         ];
-        let factors = [
-            self.compression_factor,
-            self.compression_factor_2.unwrap_or(self.compression_factor),
-        ];
         positive("fibre_modulus", moduli[0], "Pa")?;
         positive("fibre_modulus_2", moduli[1], "Pa")?;
         positive("thickness", self.thickness, "m")?;
         positive("areal_mass", self.areal_mass, "kg/m2")?;
-        let names = ["compression_factor", "compression_factor_2"];
-        for (name, factor) in names.iter().zip(factors) {
-            if !(0.0..=1.0).contains(&factor) {
-                return Err(format!("{name}: given {factor}; expected 0 to 1"));
-            }
-        }
-        let shear = self.shear.build(self.stitch)?;
         let h = self.thickness;
+        let pushed = self.pushed(moduli)?;
+        let shear = self.shear.build(self.stitch, pushed.crush.is_some())?;
         let bending = self
             .bending
             .map(|b| b.build(shear.initial_slope() * h * h / 6.0));
@@ -181,7 +183,14 @@ impl Parameters {
         Ok(Fabric {
             form: self.form,
             tension,
-            compression: [0, 1].map(|family| tension[family] * factors[family]),
+            compression: [0, 1].map(|family| tension[family] * pushed.factors[family]),
+            stiffest: [0, 1].map(|family| {
+                let crush = pushed.crush.as_ref();
+                crush.map_or(tension[family], |c| {
+                    c[family].steepest().max(tension[family])
+                })
+            }),
+            crush: pushed.crush,
             shear,
             bending: bending.transpose()?,
             thickness: h,
@@ -190,8 +199,88 @@ impl Parameters {
     }
 }
 
+/// Fibres in compression.
+struct Pushed {
+    factors: [f64; 2],
+    crush: Option<[Crush; 2]>,
+}
+
+impl Parameters {
+    /// Whether what is said of compression goes together.
+    fn check_compression(&self) -> Result<(), String> {
+        let curves = [&self.compression, &self.compression_2];
+        let factors = [self.compression_factor, self.compression_factor_2];
+        for (k, (curve, factor)) in curves.iter().zip(factors).enumerate() {
+            let family = ["", "_2"][k];
+            if let Some(factor) = factor.filter(|f| !(0.0..=1.0).contains(f)) {
+                return Err(format!(
+                    "compression_factor{family}: given {factor}; expected 0 to 1"
+                ));
+            }
+            if factor.is_some() && curve.is_some() {
+                return Err(format!(
+                    "compression{family}: given together with 'compression_factor{family}'; expected one of them: a curve, or a share of the modulus"
+                ));
+            }
+        }
+        let [first, second] = curves.map(Option::is_some);
+        if (first || second) && self.form == Form::Hypoelastic {
+            return Err("compression: given with form 'hypoelastic', which adds increments of one modulus; expected form 'fibre-energy', or \
+                        'compression_factor'"
+                .into());
+        }
+        let second = second || self.compression_factor_2.is_some();
+        if first && !second && self.fibre_modulus_2.is_some() {
+            return Err("compression_2: not given, and family 2 has a modulus of its own; expected 'compression_2' or 'compression_factor_2': stresses of \
+                        the one family are not those of the other"
+                .into());
+        }
+        Ok(())
+    }
+
+    /// What fibres with these moduli in tension (Pa) do in compression. A family without words of its own follows the first one.
+    fn pushed(&self, moduli: [f64; 2]) -> Result<Pushed, String> {
+        self.check_compression()?;
+        let first = self.compression_factor.unwrap_or(1.0);
+        let factors = [first, self.compression_factor_2.unwrap_or(first)];
+        if self.compression.is_none() && self.compression_2.is_none() {
+            return Ok(Pushed {
+                factors,
+                crush: None,
+            });
+        }
+        let h = self.thickness;
+        // A share of the modulus is a straight curve, so that both families have one kernel. One without any stiffness stays so.
+        let straight = |family: usize| {
+            let slope = factors[family] * moduli[family] * h;
+            Crush::new(&[0.0, 0.5], &[0.0, 0.5 * slope])
+        };
+        let curved = |name: &str, c: &CompressionParameters, modulus: f64| {
+            let (strains, stresses) = (&c.table.strains, &c.table.stresses);
+            checks::compression_table(&format!("{name}.table"), strains, stresses, modulus)?;
+            let forces: Vec<f64> = stresses.iter().map(|s| s * h).collect();
+            Ok::<_, String>(Crush::new(strains, &forces))
+        };
+        let crush_1 = match &self.compression {
+            Some(c) => curved("compression", c, moduli[0])?,
+            None => straight(0),
+        };
+        let follows = self.compression.is_some() && self.compression_factor_2.is_none();
+        let crush_2 = match &self.compression_2 {
+            Some(c) => curved("compression_2", c, moduli[1])?,
+            None if follows => crush_1.clone(),
+            None => straight(1),
+        };
+        Ok(Pushed {
+            factors,
+            crush: Some([crush_1, crush_2]),
+        })
+    }
+}
+
 impl ShearParameters {
-    fn build(self, stitch: Option<StitchParameters>) -> Result<Shear, String> {
+    /// `signed`: as [`Shear::new`] has it.
+    fn build(self, stitch: Option<StitchParameters>, signed: bool) -> Result<Shear, String> {
         let soft = self.allow_softening;
         let positive = branch("shear", self.coefficients, self.limit, self.table, soft)?;
         let negative = match self.negative {
@@ -216,7 +305,7 @@ impl ShearParameters {
             None => None,
         };
         let slider = self.hysteresis.map(|h| h.build()).transpose()?;
-        Ok(Shear::new(positive, negative, stitch, slider))
+        Ok(Shear::new(positive, negative, stitch, slider, signed))
     }
 }
 

@@ -1,6 +1,7 @@
 //! A ply, whatever the form of its law.
 
 use super::bending::Bending;
+use super::compression::Crush;
 use super::shear::Shear;
 use crate::Lanes;
 
@@ -20,6 +21,10 @@ pub struct Fabric {
     /// Fibre stiffness of each family in tension and in compression (N/m).
     pub(super) tension: [f64; 2],
     pub(super) compression: [f64; 2],
+    /// Of each family in compression instead, where that is a curve; of neither or of both.
+    pub(super) crush: Option<[Crush; 2]>,
+    /// Largest fibre stiffness of each family, at any stretch (N/m).
+    pub(super) stiffest: [f64; 2],
     pub(super) shear: Shear,
     pub(super) bending: Option<Bending>,
     pub(super) thickness: f64,

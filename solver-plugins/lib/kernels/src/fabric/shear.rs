@@ -26,20 +26,21 @@ pub(super) struct Shear {
 }
 
 impl Shear {
-    /// The law for g > 0, that for g < 0 over |g| (absent: odd), the stitch, and the friction of the yarns.
+    /// The law for g > 0, that for g < 0 over |g| (absent: odd), the stitch, and the friction of the yarns. `signed`: whether it is to be kept by sign even
+    /// where both are the same: plies whose yarns rub, or whose fibres follow a curve in compression, have one kernel, that of any two laws.
     pub(super) fn new(
         positive: Branch,
         negative: Option<Branch>,
         stitch: Option<Stitch>,
         slider: Option<Slider>,
+        signed: bool,
     ) -> Self {
         let first = positive.initial_slope();
         let initial_slope = negative
             .as_ref()
             .map_or(first, |n| 0.5 * (first + n.initial_slope()));
         let yarn = match (positive, negative) {
-            // Yarns that rub have one kernel, that of any two laws.
-            (p, n) if slider.is_some() => Yarn::Signed(Box::new(Signed {
+            (p, n) if signed || slider.is_some() => Yarn::Signed(Box::new(Signed {
                 negative: n.unwrap_or_else(|| p.clone()),
                 positive: p,
             })),

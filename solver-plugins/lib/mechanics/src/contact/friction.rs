@@ -172,7 +172,18 @@ impl FibreField {
     /// Fibres along `direction` (in the sheet's plane) at the positions `x` (m) of the model's nodes. `cells`: those of the
     /// sheet, of which the first has the number `first_cell` in the model.
     pub fn new(cells: &[[u32; 4]], first_cell: usize, x: &[Vec3], direction: Vec3) -> Self {
-        let components = cells.iter().map(|cell| {
+        Self::steered(cells, first_cell, x, |_| direction)
+    }
+
+    /// The same with a direction for each cell, by its number among `cells`.
+    pub fn steered(
+        cells: &[[u32; 4]],
+        first_cell: usize,
+        x: &[Vec3],
+        direction: impl Fn(usize) -> Vec3,
+    ) -> Self {
+        let components = cells.iter().enumerate().map(|(k, cell)| {
+            let direction = direction(k);
             let [a, b] = middle_lines(cell.map(|n| x[n as usize]));
             let (aa, bb, ab) = (dot(a, a), dot(b, b), dot(a, b));
             let (da, db) = (dot(direction, a), dot(direction, b));
@@ -197,11 +208,15 @@ impl FibreField {
         self.of_own_cell((cell - self.first_cell) as usize, x)
     }
 
-    /// Mean direction of the cells around a node, not of unit length.
+    /// Mean direction of the cells around a node, not of unit length. A fibre has no sense: each counts in that of those before it.
     fn at_node(&self, node: u32, x: &[Vec3]) -> Vec3 {
         let cells = self.sheet.around(node).iter();
         cells.fold([0.0; 3], |sum, c| {
-            add(sum, self.of_own_cell(*c as usize, x))
+            let own = self.of_own_cell(*c as usize, x);
+            match dot(sum, own) < 0.0 {
+                true => sub(sum, own),
+                false => add(sum, own),
+            }
         })
     }
 }
@@ -313,6 +328,22 @@ mod tests {
         assert!((law.coefficient(1e5) - 0.3).abs() < 1e-15);
         assert!((law.coefficient(2e5) / 0.3 - 2f64.powf(-0.3)).abs() < 1e-15);
         assert_eq!(law.coefficient(0.0), LARGEST_COEFFICIENT);
+    }
+
+    #[test]
+    fn a_fibre_has_no_sense_where_the_cells_about_a_node_name_opposite_ones() {
+        let mesh = QuadMesh::grid(&[0.0, 0.01, 0.02], &[0.0, 0.01, 0.02]);
+        let along = |angle: f64| [angle.cos(), angle.sin(), 0.0];
+        // By cell about the node in the middle: steered fibres near 90 degrees are told as 85 or as -85.
+        let angles = [85.0, -85.0, 88.0, -88.0f64].map(f64::to_radians);
+        let of = |turn: f64| {
+            let each = |c: usize| along(angles[c] + if c % 2 == 1 { turn } else { 0.0 });
+            let field = FibreField::steered(&mesh.cells, 0, &mesh.points, each);
+            unit(field.at_node(4, &mesh.points))
+        };
+        let [a, b] = [of(0.0), of(std::f64::consts::PI)];
+        assert!(norm(sub(a, [0.0, 1.0, 0.0])) < 0.01, "{a:?}");
+        assert!(norm(sub(a, b)) < 1e-12, "{a:?} {b:?}");
     }
 
     #[test]

@@ -118,6 +118,7 @@ impl Model {
         let s = spec.element.sizes;
         let rotates = spec.element.rotates();
         check_elsewhere(&spec)?;
+        check_steered(&spec)?;
         let orders = orders(&spec, &self.centres(&cells));
         self.topology
             .cell_place
@@ -134,6 +135,8 @@ impl Model {
             self.add_patches(sheet_index, &spec, material.bending_history)?;
         }
         self.topology.cells.extend(cells);
+        let (straight, steered) = (spec.axis, spec.steered);
+        let axis = |c: u32| steered.as_ref().map_or(straight, |s| s.cells[c as usize]);
         let mut sheet = Sheet {
             name: spec.name,
             nodes: self.topology.mirroring.own(spec.nodes),
@@ -148,7 +151,7 @@ impl Model {
         };
         self.initialise(
             &mut sheet,
-            spec.axis,
+            axis,
             &orders,
             &spec.least_areal_mass,
             material.areal_mass,
@@ -296,7 +299,10 @@ impl Model {
         let count = Aligned::from(count.as_slice());
         let area: Vec<f64> = (0..LANES).map(|l| of(l).area).collect();
         let area = Aligned::from(area.as_slice());
-        let axis: Vec<f64> = (0..3 * LANES).map(|k| spec.axis[k / LANES]).collect();
+        let of_lane = |l: usize| spec.axis_of_patch(of(l).nodes[0]);
+        let axis: Vec<f64> = (0..3 * LANES)
+            .map(|k| of_lane(k % LANES)[k / LANES])
+            .collect();
         let axis = Aligned::from(axis.as_slice());
         let raw = pf_patch_batch {
             size: size_of::<pf_patch_batch>() as u64,
@@ -399,6 +405,24 @@ fn orders(spec: &SheetSpec, centres: &[Vec3]) -> Vec<(Kind, Vec<u32>)> {
         (wanted, order.iter().map(|k| own[*k as usize]).collect())
     };
     kinds.map(order).collect()
+}
+
+/// Whether axes that depend on the place are told for every cell and node.
+fn check_steered(spec: &SheetSpec) -> Result<(), MechanicsError> {
+    let Some(steered) = &spec.steered else {
+        return Ok(());
+    };
+    let (cells, nodes) = (steered.cells.len(), steered.nodes.len());
+    let around = spec.patches.iter().map(|p| p.nodes[0] as usize + 1);
+    if cells == spec.cells.len() && nodes >= around.max().unwrap_or(0) {
+        return Ok(());
+    }
+    Err(MechanicsError::Input(format!(
+        "sheet '{}': its material axes are told for {cells} cells and {nodes} nodes; it has {} cells and {} nodes",
+        spec.name,
+        spec.cells.len(),
+        spec.nodes.len()
+    )))
 }
 
 /// Whether the element of [`Elsewhere`] is a membrane, and told for every cell.

@@ -26,10 +26,9 @@ struct Found {
 }
 
 impl Found {
-    fn new(axis: Vec3) -> Self {
-        let axis: Vec<f64> = (0..3 * LANES).map(|k| axis[k / LANES]).collect();
+    fn new() -> Self {
         Self {
-            axis: Aligned::from(axis.as_slice()),
+            axis: Aligned::zeros(3 * LANES),
             position: Aligned::zeros(12 * LANES),
             rates: Rates::zero(),
             force: Aligned::zeros(12 * LANES),
@@ -42,13 +41,21 @@ impl Found {
     }
 
     /// Initialises the elements of a batch, whose nodes are at `x` (m), and asks them for their critical steps. Gives their constants.
+    /// `axis`: direction of e1 by lane.
     fn ask(
         &mut self,
         element: &ElementInstance,
         batch: &mut Batch,
         x: &[Vec3],
+        axis: impl Fn(usize) -> Vec3,
         sheet: &str,
     ) -> Result<Aligned, MechanicsError> {
+        for l in 0..LANES {
+            let e1 = axis(l);
+            for k in 0..3 {
+                self.axis[k * LANES + l] = e1[k];
+            }
+        }
         gather(&batch.nodes, x, &mut self.position);
         let mut constants = Aligned::zeros(element.sizes.constants * LANES);
         let mut raw = empty_element_batch(element, 0.0, &self.position);
@@ -131,16 +138,16 @@ impl Found {
 }
 
 impl Model {
-    /// Constants and masses of a sheet, with mass scaling to the wanted step and areal mass.
+    /// Constants and masses of a sheet, with mass scaling to the wanted step and areal mass. `axis`: direction of e1 by mesh-local cell.
     pub(super) fn initialise(
         &mut self,
         sheet: &mut Sheet,
-        axis: Vec3,
+        axis: impl Fn(u32) -> Vec3,
         orders: &[(Kind, Vec<u32>)],
         least: &[f64],
         areal_mass: f64,
     ) -> Result<(), MechanicsError> {
-        let mut found = Found::new(axis);
+        let mut found = Found::new();
         let blocks = &mut self.elements.blocks[sheet.block_range.0..sheet.block_range.1];
         let batches = blocks.iter_mut().flat_map(|b| &mut b.batches);
         let mut shared = Shared::default();
@@ -148,7 +155,9 @@ impl Model {
         let mut added_mass = 0.0;
         for (batch, cells) in batches.zip(cells) {
             let element = sheet.element_of(batch);
-            let constants = found.ask(element, batch, &self.state.x, &sheet.name)?;
+            // Lanes beyond the last element repeat it.
+            let axis = |l: usize| axis(cells[l.min(cells.len() - 1)]);
+            let constants = found.ask(element, batch, &self.state.x, axis, &sheet.name)?;
             batch.constants = shared.keep(constants);
             let least = |l: usize| least[cells[l] as usize] / areal_mass;
             let (topology, state) = (&mut self.topology, &mut self.state);

@@ -80,6 +80,7 @@ pub fn sheet(name: &str, mesh: &QuadMesh, first: u32, element: ElementInstance) 
         cells: mesh.cells.clone(),
         patches: Vec::new(),
         axis: [1.0, 0.0, 0.0],
+        steered: None,
         layers: vec![1.0; m],
         pressed: vec![Pressed::No; m],
         least_areal_mass: vec![0.0; m],

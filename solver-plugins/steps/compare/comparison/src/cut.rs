@@ -71,12 +71,12 @@ fn state(
     for name in FORCES {
         forces.push(host.frame_field(&model.input, body, frame, name)?);
     }
-    let axis = model.axes[&ply.name];
+    let laid = &model.laid[&ply.name];
     let pull = |(piece, at): &(Piece, Location)| {
         let then = at.nodes.map(|i| ply.undeformed[i as usize]);
         let now = at.nodes.map(|i| points[i as usize]);
         let s = [0, 1, 2].map(|k| forces[k][at.cell]);
-        traction(then, now, s, axis, piece.normal).map(|t| t * piece.length)
+        traction(then, now, s, laid.axis_in_cell(&then), piece.normal).map(|t| t * piece.length)
     };
     Ok(State {
         place: cut.iter().map(|(_, at)| at.interpolate(&points)).collect(),
@@ -101,7 +101,7 @@ fn work(
     let locator = QuadLocator::new(&ply.undeformed, cells);
     let (true, true, Some(locator)) = (
         FORCES.iter().all(known),
-        model.axes.contains_key(&ply.name),
+        model.laid.contains_key(&ply.name),
         locator,
     ) else {
         return Ok(None);

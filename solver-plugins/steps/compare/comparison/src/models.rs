@@ -3,6 +3,7 @@
 use plyflow_defects::{Ply, Settings, Tool, of_run};
 use plyflow_geometry::rectangle;
 use plyflow_model::artifact::{Forming, Rectangle, Role, Sheet, Zone, Zones, current_zones};
+use plyflow_model::steering::Laid;
 use plyflow_sdk::{Host, Input, Meshes, StepError};
 use plyflow_surface::of_run::check_quads;
 use std::collections::BTreeMap;
@@ -39,8 +40,8 @@ pub struct Model {
     pub plies: Vec<Ply>,
     /// As many: what the run tells of them.
     pub sheets: Vec<Sheet>,
-    /// Direction of the first axis of each ply's membrane forces in the flat ply (rad), where the run tells it, by its name.
-    pub axes: BTreeMap<String, f64>,
+    /// Directions of the fibres of each flat ply, whose first axis is that of its membrane forces, where the run tells them, by its name.
+    pub laid: BTreeMap<String, Laid>,
     /// Where it came from, for its cost.
     pub input: Input,
 }
@@ -314,8 +315,8 @@ fn read(
             .sum(),
         element_cycles: cycles(&formed),
         began_late: began_late(&meshes),
-        axes: (formed.sheets.iter())
-            .filter_map(|s| Some((s.name.clone(), s.axis()?)))
+        laid: (formed.sheets.iter())
+            .filter_map(|s| Some((s.name.clone(), s.laid()?)))
             .collect(),
         plies,
         sheets,

@@ -101,7 +101,7 @@ fn entries_of(
         let sheet = &model.sheets[k];
         let others = neighbours(&model.sheets, &model.plies, k);
         let limits = limits.of_ply(sheet.over_shear);
-        find_causes(ply, &mut measured, sheet.fibres(), &others, &limits);
+        find_causes(ply, &mut measured, sheet.laid().as_ref(), &others, &limits);
         let cuts = z.cuts(bounds_in_whole(models, &ply.name), bounds_of(ply));
         for defect in measured {
             let near = |side: usize| {

@@ -101,7 +101,13 @@ fn of_run(
         let mut defects = everywhere(&plies[k], settings);
         let others = neighbours(&run.plies, &plies, k);
         let limits = limits.of_ply(sheet.over_shear);
-        find_causes(&plies[k], &mut defects, sheet.fibres(), &others, &limits);
+        find_causes(
+            &plies[k],
+            &mut defects,
+            sheet.laid().as_ref(),
+            &others,
+            &limits,
+        );
         defects
     };
     let found: Vec<Vec<Defect>> = run.plies.iter().enumerate().map(found).collect();

@@ -4,7 +4,7 @@ use crate::compressed::{Carrying, Law, excess};
 use crate::laws::PlyLaw;
 use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{Forming, Sheet};
-use plyflow_model::scene::Scene;
+use plyflow_model::scene::{Scene, first_axis};
 use plyflow_sdk::{Host, Input, StepError};
 use plyflow_surface::Topology;
 
@@ -38,9 +38,18 @@ impl Known {
         let has = |name: &str| body.fields.iter().any(|f| f.name == name);
         let all = FORCES.iter().chain([&PRESSURE]);
         let missing: Vec<&str> = all.copied().filter(|f| !has(f)).collect();
-        let axis = sheet.axis().filter(|_| missing.is_empty());
+        let straight = sheet.laid().and_then(|l| Some(l.straight()?));
+        let axis = straight.filter(|_| missing.is_empty());
+        let axis = axis.map(|[first, second]| first_axis(first, second));
         let axis = axis.ok_or_else(|| {
             let what = match &missing[..] {
+                [] if sheet.steering.is_some() => {
+                    return format!(
+                        "scene: given, so compressed fibres are to be judged, but the fibres of ply '{}' of '{}' are steered, and a ruck is looked for \
+                         along straight fibres alone; leave out `scene`",
+                        sheet.name, input.step
+                    );
+                }
                 [] => "fibre directions".to_owned(),
                 fields => fields.join(", "),
             };

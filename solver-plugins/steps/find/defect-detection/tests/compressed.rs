@@ -323,4 +323,10 @@ fn what_cannot_be_judged_is_refused_with_what_is_missing() {
         scene(1, &constant()),
         &["does not tell fibre directions"],
     );
+    aimless.attributes["sheets"][0]["steering"] = json!([[0.0, 0.0, 0.1], [0.1, 0.0, 0.2]]);
+    refused(
+        &aimless,
+        scene(1, &constant()),
+        &["the fibres of ply 'ply_1'", "are steered"],
+    );
 }

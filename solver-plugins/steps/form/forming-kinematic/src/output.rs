@@ -321,7 +321,7 @@ fn number(why: Stop) -> f64 {
 
 fn sheet(d: &Done) -> Sheet {
     let (s, material) = (&d.ply.scene, &d.ply.material);
-    let [first, second] = d.ply.scene.fibres();
+    let [first, second] = d.ply.fibres;
     Sheet {
         material: Some(material.name.clone()),
         areal_mass: Some(material.areal_mass.si()),

@@ -22,6 +22,8 @@ pub struct Ply {
     pub offset: f64,
     /// Its shape before forming.
     pub blank: Blank,
+    /// Directions of its fibre families (rad, from x).
+    pub fibres: [f64; 2],
 }
 
 /// The plies of a scene from the tool upwards; films count with their thickness.
@@ -32,7 +34,7 @@ pub fn plies(scene: &Scene) -> Result<Vec<Ply>, String> {
     rules::check(scene).map_err(|fault| format!("scene.{fault}"))?;
     let mut below = 0.0;
     let mut found = Vec::new();
-    for sheet in &scene.sheets {
+    for (k, sheet) in scene.sheets.iter().enumerate() {
         let MaterialEntry::Inline(material) = &sheet.material else {
             return Err(format!(
                 "the material of sheet '{}' was not read in",
@@ -45,7 +47,16 @@ pub fn plies(scene: &Scene) -> Result<Vec<Ply>, String> {
         if sheet.kind != SheetKind::Ply {
             continue;
         }
+        // Threads at even distances, as a net has them, lie along curves nowhere but on a surface that curves as much.
+        let fibres = sheet.fibres().ok_or_else(|| {
+            format!(
+                "scene.sheets[{k}].fibre_1: the fibres of ply '{}' are steered; expected one direction, as a pin-jointed net of threads at even distances \
+                 cannot be laid along curves (forming-explicit forms steered plies)",
+                sheet.name
+            )
+        })?;
         let ply = Ply {
+            fibres,
             scene: sheet.clone(),
             material: (**material).clone(),
             offset,
@@ -61,7 +72,7 @@ impl Ply {
     /// families in the order of the scene, or the other way round, so that the stitch still lies between them.
     pub fn directions(&self) -> [f64; 2] {
         use std::f64::consts::TAU;
-        let [first, second] = self.scene.fibres();
+        let [first, second] = self.fibres;
         let (a, b) = if (second - first).fixed_sin() >= 0.0 {
             (first, second)
         } else {

@@ -360,6 +360,16 @@ fn wrong_input_is_refused_with_what_to_do() {
         along.contains("fibre_1") && along.contains("3 deg apart"),
         "{along}"
     );
+    let mut steered = scene(hemisphere(), [0.1, 0.1], [0.0, 90.0]);
+    let sheets = steered["sheets"].as_array_mut().unwrap();
+    let ply = sheets.iter_mut().find(|s| s["kind"] == "ply").unwrap();
+    ply["fibre_1"] = json!({"points": [{"x": "0 m", "y": "0 m", "angle": "0.1 rad"}]});
+    ply.as_object_mut().unwrap().remove("fibre_2");
+    let curved = drape(json!({"scene": steered})).unwrap_err();
+    assert!(
+        curved.contains("fibre_1: the fibres of ply 'ply_1' are steered"),
+        "{curved}"
+    );
     let mut bare = scene(hemisphere(), [0.1, 0.1], [0.0, 90.0]);
     bare["sheets"] = json!([bare["sheets"][0]]);
     let none = drape(json!({"scene": bare})).unwrap_err();

@@ -122,7 +122,7 @@ impl Coarse<'_> {
     pub(crate) fn pulls(&self, host: &Host, stiffness: f64) -> Result<Pulls, StepError> {
         let of = &self.whole;
         let (ply, step) = (&of.sheet.name, &of.input.step);
-        let axis = of.sheet.axis().ok_or_else(|| {
+        let laid = of.sheet.laid().ok_or_else(|| {
             format!(
                 "`cut_stiffness` is given, and ply '{ply}' of '{step}' does not tell where its fibres lie (`fibre_1`, `fibre_2`). Leave out `cut_stiffness`, or run that step again"
             )
@@ -139,7 +139,7 @@ impl Coarse<'_> {
             &self.fine.driven_nodes,
             &of.points,
             &of.cells,
-            axis,
+            laid,
         );
         let mut force = Vec::new();
         for frame in 0..of.meshes.times.len() {

@@ -4,6 +4,7 @@ use crate::grid::{Grid, SAME_PLACE, SIDES};
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::{Vec3, add};
 use plyflow_geometry::{Location, QuadLocator};
+use plyflow_model::steering::Laid;
 use plyflow_surface::traction;
 
 /// Fields of a coarse ply that hold S11, S22, S12 (N/m).
@@ -30,8 +31,8 @@ pub(crate) struct Pull {
     driven: usize,
     /// `[coarse nodes]` (m).
     undeformed: Vec<Vec3>,
-    /// Direction of the first of the axes of the forces, from x (rad).
-    axis: f64,
+    /// Directions of the fibres, whose first axis is that of the forces.
+    laid: Laid,
 }
 
 impl Pull {
@@ -41,7 +42,7 @@ impl Pull {
         driven: &[u32],
         undeformed: &[Vec3],
         cells: &[u32],
-        axis: f64,
+        laid: Laid,
     ) -> Self {
         let locator = QuadLocator::new(undeformed, cells);
         let mut pieces = Vec::new();
@@ -91,7 +92,7 @@ impl Pull {
             pieces,
             driven: driven.len(),
             undeformed: undeformed.to_vec(),
-            axis,
+            laid,
         }
     }
 
@@ -116,7 +117,8 @@ impl Pull {
                 let [then, now] =
                     [&self.undeformed[..], points].map(|p| at.nodes.map(|n| p[n as usize]));
                 let s = [0, 1, 2].map(|k| forces[k][at.cell]);
-                let pull = traction(then, now, s, self.axis, piece.normal).map(|t| share * t);
+                let axis = self.laid.axis_in_cell(&then);
+                let pull = traction(then, now, s, axis, piece.normal).map(|t| share * t);
                 for end in piece.ends {
                     all[end] = add(all[end], pull);
                 }
@@ -156,7 +158,8 @@ mod tests {
         let grid = ply_grid([0.02, 0.01, 0.2, 0.05], [0.0, 0.0, 0.1, 0.06], 0.005).unwrap();
         let driven = grid.driven_nodes();
         let axis = 0.4f64;
-        let pull = Pull::new(&grid, &driven, &points, &cells, axis);
+        let laid = Laid::Straight([axis, axis + std::f64::consts::FRAC_PI_2]);
+        let pull = Pull::new(&grid, &driven, &points, &cells, laid);
         let (s, c) = axis.sin_cos();
         let even = [500.0 * c * c, 500.0 * s * s, -500.0 * s * c];
         let forces = even.map(|v| vec![v; cells.len() / 4]);
@@ -187,7 +190,13 @@ mod tests {
             .unwrap()
             .unwrap();
         let driven = grid.driven_nodes();
-        let pull = Pull::new(&grid, &driven, &coarse.points, cells, 0.0);
+        let pull = Pull::new(
+            &grid,
+            &driven,
+            &coarse.points,
+            cells,
+            Laid::Straight([0.0, 1.0]),
+        );
         let forces = [500.0, 0.0, 0.0].map(|v| vec![v; coarse.cells.len()]);
         let all = pull.forces(&coarse.points, &forces);
         let sum = all.iter().fold([0.0; 3], |s, f| add(s, *f));

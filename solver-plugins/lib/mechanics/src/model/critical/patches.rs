@@ -417,6 +417,7 @@ fn sheet(kit: &Kit, r: &mut Random, mesh: &QuadMesh, direction: f64, range: Rang
         cells: mesh.cells.clone(),
         patches,
         axis: [direction.cos(), direction.sin(), 0.0],
+        steered: None,
         layers: weights(joined, 2.0),
         pressed: vec![Pressed::No; m],
         least_areal_mass: weights(heavy, 3.0).iter().map(|w| w * areal_mass).collect(),

@@ -177,6 +177,7 @@ fn sheets_of(
             cells: mesh.cells,
         };
         let spec = SheetSpec {
+            steered: sheet.steered(&local.points, &local.cells),
             pressed: vec![pressed; local.cells.len()],
             other_material,
             ..plain(sheet, meshed, element, elements.p)

@@ -4,7 +4,6 @@ use crate::course::HistoryRow;
 use crate::forming::Forming;
 use crate::judge::scale;
 use crate::measure::{Penetration, cell_strain};
-use crate::stack::sheet;
 use crate::words::in_mm;
 use plyflow_geometry::vec3::{Vec3, norm};
 use std::fmt::Write;
@@ -223,7 +222,8 @@ fn weakest(forming: &Forming) -> Option<Weakest> {
     let (body, sheet) = sheets.find(|(b, _)| b.sheet.cell_range(m).contains(&cell))?;
     let nodes = m.cells()[cell];
     let of = |points: &[Vec3]| nodes.map(|n| points[n as usize]);
-    let (shear, strain) = cell_strain(of(&forming.reference), of(m.x()), sheet::axis(&sheet.scene));
+    let then = of(&forming.reference);
+    let (shear, strain) = cell_strain(then, of(m.x()), sheet.axis_in_cell(&then));
     Some(Weakest {
         shear,
         is_film: !sheet.is_ply(),

@@ -1,7 +1,6 @@
 //! Shear angles and fibre strains of the plies, from their cells alone.
 
 use crate::forming::Forming;
-use crate::stack::sheet;
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::{Vec3, add, dot, norm, scale, sub};
 
@@ -18,11 +17,12 @@ pub struct PlyStrains {
 pub fn ply_strains(forming: &Forming) -> PlyStrains {
     let (mut low, mut high, mut fibre) = (f64::INFINITY, f64::NEG_INFINITY, 0.0f64);
     for (body, sheet) in forming.plies() {
-        let axis = sheet::axis(&sheet.scene);
         let mut count = |cells: &[[u32; 4]], then: &[Vec3], now: &[Vec3]| {
             for cell in cells {
                 let of = |points: &[Vec3]| cell.map(|n| points[n as usize]);
-                let (g, e) = cell_strain(of(then), of(now), axis);
+                let then = of(then);
+                let axis = sheet.axis_in_cell(&then);
+                let (g, e) = cell_strain(then, of(now), axis);
                 (low, high) = (low.min(g), high.max(g));
                 fibre = fibre.max(e);
             }

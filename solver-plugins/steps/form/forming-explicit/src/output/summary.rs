@@ -41,10 +41,7 @@ fn sheet_attributes(forming: &Forming, p: &Parameters) -> Vec<artifact::Sheet> {
                 sheet.bending_elements = Some(forming.model.planes().copies() * cells);
             }
             if let Ok(blank) = sheet::blank(s) {
-                let first = s.scene.fibre_1.si();
-                let across = first + std::f64::consts::FRAC_PI_2;
-                sheet.fibre_1 = Some(first);
-                sheet.fibre_2 = Some(s.scene.fibre_2.map_or(across, |a| a.si()));
+                sheet = sheet.with_fibres(&s.laid);
                 sheet.outline = Some(blank.outline().to_vec());
                 sheet.holes = blank.holes().to_vec();
             }

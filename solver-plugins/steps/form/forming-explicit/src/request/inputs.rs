@@ -4,9 +4,9 @@ use crate::error::{FormingError, Result};
 use crate::request::cut::{LocalInput, LocalSheet, RecordedWay, Start};
 use crate::request::parameters::Parameters;
 use plyflow_geometry::vec3::Vec3;
-use plyflow_model::artifact::{Boundary, MeshStudy, Rectangle, Zones};
+use plyflow_model::artifact::{self, Boundary, MeshStudy, Rectangle, Zones};
 use plyflow_model::material::MaterialEntry;
-use plyflow_model::scene::{PartMotion, Process, Scene, SheetKind};
+use plyflow_model::scene::{Laid, PartMotion, Process, Scene, Sheet, SheetKind};
 use plyflow_sdk::{Host, Input, Log};
 
 /// The element size (m) that a mesh study advises, if there is one.
@@ -139,10 +139,20 @@ fn fits(scene: &Scene, boundary: &Boundary, step: &str) -> Result<()> {
             MaterialEntry::Inline(material) => Some(material.thickness.si()),
             _ => None,
         };
-        let fibres = (sheet.kind == SheetKind::Ply).then_some(());
+        let laid = match sheet.kind {
+            SheetKind::Ply => sheet.fibres(),
+            SheetKind::Diaphragm => None,
+        };
         let degree = 1f64.to_degrees();
-        let fibre_1 = fibres.map(|()| sheet.fibre_1.si());
-        let fibre_2 = fibres.and(sheet.fibre_2.map(|a| a.si()));
+        let [fibre_1, fibre_2] = [0, 1].map(|k| laid.map(|fibres| fibres[k]));
+        steered_alike(sheet, told).or_else(|there_here| {
+            let [there, here] = there_here;
+            differs(
+                &format!("the direction of the fibres of sheet '{name}'"),
+                &there,
+                &here,
+            )
+        })?;
         let held = [
             ("thickness", "mm", 1e3, Some(told.thickness), thickness),
             ("fibre_1", "deg", degree, told.fibre_1, fibre_1),
@@ -162,6 +172,28 @@ fn fits(scene: &Scene, boundary: &Boundary, step: &str) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Whether a ply is steered alike in the run of the whole and in the scene; else how it is there, and here.
+fn steered_alike(sheet: &Sheet, told: &artifact::Sheet) -> std::result::Result<(), [String; 2]> {
+    let own = match sheet.laid() {
+        Ok(Laid::Steered(field)) => Some(field.points().to_vec()),
+        _ => None,
+    };
+    // Older runs tell no directions at all.
+    let straight = told.steering.is_none() && told.fibre_1.is_none();
+    if straight && own.is_none() || told.steering == own {
+        return Ok(());
+    }
+    let text = |points: &Option<Vec<[f64; 3]>>| match points {
+        Some(points) => format!("steered by {} points", points.len()),
+        None => "the same everywhere".to_owned(),
+    };
+    let (there, here) = (text(&told.steering), text(&own));
+    match there == here {
+        true => Err([format!("{there} of other places or directions"), here]),
+        false => Err([there, here]),
+    }
 }
 
 /// Times and driven sheets of a boundary artifact.

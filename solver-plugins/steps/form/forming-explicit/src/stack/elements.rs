@@ -42,6 +42,14 @@ pub struct Elements<'a> {
 impl Elements<'_> {
     /// Makes the element of a sheet with its material.
     fn element(&self, sheet: &StackSheet, choice: &ComponentChoice) -> Result<ElementInstance> {
+        let along = choice.with.get("fibres_along_sides") == Some(&true.into());
+        if along && sheet.laid.straight().is_none() {
+            return Err(FormingError::Element(format!(
+                "element: given '{}' with fibres_along_sides, and the fibres of ply '{}' are steered; expected an element for fibres of any direction, such \
+                 as m4: sides of elements do not follow steered fibres",
+                choice.plugin, sheet.scene.name
+            )));
+        }
         self.of_material(sheet, choice, self.material(sheet)?)
     }
 

@@ -5,7 +5,7 @@ use crate::request::Parameters;
 use crate::stack::body::Body;
 use crate::stack::elements::{Elements, bending_part, patches};
 use crate::stack::place::{Placed, SheetIndex};
-use crate::stack::sheet::{self, StackSheet};
+use crate::stack::sheet::StackSheet;
 use crate::stack::{regions, symmetry};
 use plyflow_blank::Blank;
 use plyflow_geometry::vec3::Vec3;
@@ -52,7 +52,8 @@ pub fn plain(
         nodes: meshed.nodes,
         cells: meshed.cells,
         patches: meshed.patches,
-        axis: sheet::axis(&sheet.scene),
+        axis: sheet.axis_at([0.0; 2]),
+        steered: None,
         layers: vec![1.0; count],
         pressed: vec![Pressed::No; count],
         least_areal_mass: vec![p.least_areal_mass; count],
@@ -118,6 +119,7 @@ impl Parts {
         if elsewhere.is_none() && element.sizes.patch_nodes > 0 && patches.is_empty() {
             return Err(too_few_elements(name, blank, p));
         }
+        let steered = sheet.steered(&mesh.points, &mesh.cells);
         let cells = mesh.cells;
         let meshed = Meshed {
             nodes,
@@ -125,6 +127,7 @@ impl Parts {
             patches,
         };
         let spec = SheetSpec {
+            steered,
             elsewhere,
             other_material,
             ..plain(sheet, meshed, element, p)

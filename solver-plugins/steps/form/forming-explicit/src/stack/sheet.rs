@@ -5,9 +5,10 @@ use plyflow_blank::Blank;
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::mirror::Planes;
+use plyflow_mechanics::sheet::SteeredAxes;
 use plyflow_model::material::{Material, MaterialEntry};
 use plyflow_model::rules;
-use plyflow_model::scene::{Scene, Sheet, SheetKind, first_axis};
+use plyflow_model::scene::{Laid, Scene, Sheet, SheetKind};
 
 /// A sheet of the stack with what the contacts and the output need.
 #[derive(Debug, Clone)]
@@ -16,6 +17,8 @@ pub struct StackSheet {
     pub scene: Sheet,
     /// Its material.
     pub material: Material,
+    /// Directions of its fibres before forming.
+    pub laid: Laid,
     /// Thickness (m).
     pub thickness: f64,
     /// Distance of its mid-plane from the tool surface when the stack is compact (m).
@@ -26,6 +29,28 @@ impl StackSheet {
     /// Whether it is a ply, not a film.
     pub fn is_ply(&self) -> bool {
         self.scene.kind == SheetKind::Ply
+    }
+
+    /// Direction of material axis e1 at a place of the undeformed plane (m).
+    pub fn axis_at(&self, place: [f64; 2]) -> Vec3 {
+        let e1 = self.laid.axis_at(place);
+        [e1.fixed_cos(), e1.fixed_sin(), 0.0]
+    }
+
+    /// As [`StackSheet::axis_at`], in the middle of a cell whose corners were at `then` (m) before forming.
+    pub fn axis_in_cell(&self, then: &[Vec3; 4]) -> Vec3 {
+        let middle = |k: usize| 0.25 * then.iter().map(|c| c[k]).sum::<f64>();
+        self.axis_at([middle(0), middle(1)])
+    }
+
+    /// Directions of e1 in the cells and at the nodes of its flat mesh (`points`, m; `cells` in their numbers); `None` where its fibres are straight.
+    pub fn steered(&self, points: &[Vec3], cells: &[[u32; 4]]) -> Option<SteeredAxes> {
+        matches!(self.laid, Laid::Steered(_)).then(|| SteeredAxes {
+            cells: (cells.iter())
+                .map(|c| self.axis_in_cell(&c.map(|n| points[n as usize])))
+                .collect(),
+            nodes: points.iter().map(|p| self.axis_at([p[0], p[1]])).collect(),
+        })
     }
 }
 
@@ -46,7 +71,11 @@ pub fn stack(scene: &Scene) -> Result<Vec<StackSheet>> {
                     sheet.name
                 )));
             };
+            let laid = sheet.laid().map_err(|e| {
+                FormingError::Scene(format!("fibre_1 of sheet '{}': {e}", sheet.name))
+            })?;
             Ok(StackSheet {
+                laid,
                 scene: sheet.clone(),
                 material: (**material).clone(),
                 thickness: material.thickness.si(),
@@ -72,28 +101,20 @@ const SQUARE: f64 = 1e-6;
 
 /// Whether the solver can compute a sheet as the scene has it.
 fn check_sheet(sheet: &Sheet) -> Result<()> {
-    if let (SheetKind::Ply, Some(second)) = (sheet.kind, sheet.fibre_2) {
+    if let (SheetKind::Ply, Some([first, second])) = (sheet.kind, sheet.fibres()) {
         let degrees = |angle: f64| (1e6 * angle.to_degrees()).round() / 1e6;
-        let between = second.si() - sheet.fibre_1.si();
+        let between = second - first;
         if between.fixed_cos().abs() > SQUARE {
             return Err(FormingError::Scene(format!(
                 "ply '{}': given fibres at {} and {} deg; expected families that cross at a right angle before forming, such as -45 and 45 deg: \
                  elements and material laws of forming-explicit measure shear from there. (forming-kinematic drapes other angles too)",
                 sheet.name,
-                degrees(sheet.fibre_1.si()),
-                degrees(second.si())
+                degrees(first),
+                degrees(second)
             )));
         }
     }
     Ok(())
-}
-
-/// Direction of material axis e1 in the undeformed plane.
-pub fn axis(sheet: &Sheet) -> Vec3 {
-    let first = sheet.fibre_1.si();
-    let square = || first + std::f64::consts::FRAC_PI_2;
-    let e1 = first_axis(first, sheet.fibre_2.map_or_else(square, |a| a.si()));
-    [e1.fixed_cos(), e1.fixed_sin(), 0.0]
 }
 
 /// The blank of a ply before forming.

@@ -139,11 +139,9 @@ pub fn check_material(element: &ElementInstance, sheet: &StackSheet, planes: Pla
 /// # Errors
 /// When it does not, and what to write instead.
 pub fn check_order(element: &ElementInstance, sheet: &StackSheet) -> Result<()> {
-    let (first, second) = (&sheet.scene.fibre_1, &sheet.scene.fibre_2);
-    let Some(second) = second
-        .as_ref()
-        .filter(|s| first_axis(first.si(), s.si()) != first.si())
-    else {
+    // The second family of a steered ply follows the first one everywhere.
+    let clockwise = |[first, second]: &[f64; 2]| first_axis(*first, *second) != *first;
+    let Some(fibres) = sheet.scene.fibres().filter(clockwise) else {
         return Ok(());
     };
     let material = &*element.material;
@@ -156,7 +154,7 @@ pub fn check_order(element: &ElementInstance, sheet: &StackSheet) -> Result<()> 
     if in_plane.max(bending) <= RESPONSE_APART {
         return Ok(());
     }
-    let [first, second] = [first.si(), second.si()].map(f64::to_degrees);
+    let [first, second] = fibres.map(f64::to_degrees);
     Err(FormingError::Symmetry(format!(
         "sheet '{}': fibre_2 ({second:.1} deg) lies clockwise from fibre_1 ({first:.1} deg), and material '{}' tells its families apart: its first \
          would lie along fibre_2. Expected fibre_2 a quarter turn counter-clockwise from fibre_1: for the stitch on the same side write \

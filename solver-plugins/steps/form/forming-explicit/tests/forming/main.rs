@@ -18,6 +18,7 @@ mod single_film;
 mod sliding;
 mod small_part;
 mod stamping;
+mod steered;
 mod symmetry;
 mod taken_up;
 mod tools;

@@ -4,6 +4,7 @@ use crate::common::cut::{Film, cut_out};
 use crate::common::scenes::{gentle_press, press};
 use crate::common::{BuiltIn, Silent};
 use crate::stamping::{block, pad, process, stamped, with};
+use crate::steered::{steered, table};
 use plyflow_forming_explicit::{
     Forming, HistoryRow, LocalInput, Outcome, Parameters, RecordedWay, build_global, build_local,
 };
@@ -184,10 +185,14 @@ fn a_zone_that_is_the_whole_ply_does_what_the_whole_does() {
         p["scene"]["process"]["press"]["forming_time"] = json!("0.06 s");
     });
     p.element_size = 0.008;
-    let whole = Whole::formed(p);
-    let (forming, _) = whole.run(whole.zone(ALL, 0, &[]), 1);
-    assert!(forming.model.x() == whole.forming.model.x());
-    assert!(forming.model.v() == whole.forming.model.v());
+    // Steered fibres have the directions of their place in a zone, too.
+    let turning = table(|x, y| 4.0 * x - 9.0 * y);
+    for p in [p.clone(), steered(p, &turning)] {
+        let whole = Whole::formed(p);
+        let (forming, _) = whole.run(whole.zone(ALL, 0, &[]), 1);
+        assert!(forming.model.x() == whole.forming.model.x());
+        assert!(forming.model.v() == whole.forming.model.v());
+    }
     // Under one with a force it stops where it was then, between two rows as well.
     let whole = Whole::formed(gentle_press("m4", 0.0, &[]));
     let (forming, _) = whole.run(whole.zone(ALL, 0, &[HOLDER]), 1);

@@ -1,6 +1,6 @@
 //! By which law two surfaces of a scene rub on each other.
 
-use crate::error::Result;
+use crate::error::{FormingError, Result};
 use crate::stack::friction::through::{at_one_bar, least, without_fibres_of_others};
 use crate::stack::place::SheetIndex;
 use crate::stack::regions::{self, PlacedRegion};
@@ -248,9 +248,16 @@ impl<'a> FrictionTable<'a> {
             sheet.filter(|s| s.kind == SheetKind::Ply)
         });
         let found = whose(law, touching.parts, plies)?;
-        let direction = found.fibres()[usize::from(law.family != 1)];
+        let family = usize::from(law.family != 1);
         let (own, first_cell) = cells(model, &found.name);
-        let along = [direction.fixed_cos(), direction.fixed_sin(), 0.0];
+        let laid = found
+            .laid()
+            .map_err(|e| FormingError::Scene(format!("fibre_1 of sheet '{}': {e}", found.name)))?;
+        // The model lies flat yet.
+        let along = |cell: usize| {
+            let direction = laid.in_cell(&own[cell].map(|n| model.x()[n as usize]))[family];
+            [direction.fixed_cos(), direction.fixed_sin(), 0.0]
+        };
         let whose = if found.name == touching.slave {
             Whose::Slave
         } else {
@@ -260,7 +267,7 @@ impl<'a> FrictionTable<'a> {
         Ok(AngleDependence {
             factors: rows.collect(),
             whose,
-            fibres: FibreField::new(own, first_cell, model.x(), along),
+            fibres: FibreField::steered(own, first_cell, model.x(), along),
         })
     }
 }
