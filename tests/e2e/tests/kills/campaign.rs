@@ -8,7 +8,7 @@ use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// What is killed, and how often.
 pub struct Plan {
@@ -20,7 +20,8 @@ pub struct Plan {
     pub words: &'static [&'static str],
     /// Kills in all.
     pub kills: u64,
-    /// Latest moment of a kill after the one before it, or after the start (s).
+    /// Latest moment of a kill after the one before it, or after the start: a share of the time that the undisturbed run takes. Most are
+    /// much earlier, by the cube of a random number, and some late enough for the workflow to get on.
     pub horizon: f64,
     /// Of which all moments and victims follow.
     pub seed: u64,
@@ -55,12 +56,16 @@ struct Kept {
     said: Vec<String>,
     /// The artifacts of the undisturbed run.
     artifacts: Vec<String>,
+    /// How long that run took (s).
+    calm: f64,
 }
 
 /// A campaign of kills.
 pub struct Campaign<'a> {
     plan: &'a Plan,
     expected: BTreeMap<String, Vec<u8>>,
+    /// How long the undisturbed run takes (s).
+    calm: f64,
     count: Count,
     watch: Watch,
     said: Vec<String>,
@@ -94,8 +99,10 @@ impl Plan {
     pub fn carry_out(&self) -> (Count, Vec<String>) {
         std::fs::create_dir_all(self.folder.join("temporary")).expect("a folder");
         let calm = self.folder.join("calm");
+        let begun = Instant::now();
         let status = self.command(&calm, 2).stderr(Stdio::null()).status();
         assert!(status.expect("plyflow starts").success());
+        let took = begun.elapsed().as_secs_f64();
         let expected = artifacts(&calm);
         let kept = std::fs::read(self.folder.join("count.json")).unwrap_or_default();
         let kept: Kept = serde_json::from_slice(&kept).unwrap_or_default();
@@ -108,6 +115,8 @@ impl Plan {
         let mut campaign = Campaign {
             plan: self,
             expected,
+            // What is gone on with is in the store already.
+            calm: took.max(kept.calm),
             count: kept.count,
             watch: Watch::begin(&self.store()),
             said: kept.said,
@@ -128,6 +137,7 @@ impl Campaign<'_> {
             count: self.count.clone(),
             said: self.said.clone(),
             artifacts: self.expected.keys().cloned().collect(),
+            calm: self.calm,
         };
         let text = serde_json::to_vec(&kept).expect("numbers");
         let new = self.plan.folder.join("count.new");
@@ -149,7 +159,8 @@ impl Campaign<'_> {
             });
         }
         let ended = loop {
-            std::thread::sleep(Duration::from_secs_f64(self.plan.horizon * random.unit()));
+            let latest = self.plan.horizon * self.calm;
+            std::thread::sleep(Duration::from_secs_f64(latest * random.unit().powi(3)));
             if let Some(status) = head.try_wait().expect("a child") {
                 break status.code();
             }
