@@ -74,7 +74,7 @@ fn a_single_film_is_told_with_its_frame_and_absolute_pressures() {
     for text in [
         "single-diaphragm forming",
         ">stretching</text>",
-        "pressure under the film (kPa)",
+        "height of the frame (mm)",
         "Pressures are absolute.",
         "forming pressure 90 kPa",
         "surroundings at 100 kPa",

@@ -177,7 +177,7 @@ fn under_a_single_film_the_lowest_ply_lies_on_the_tool_itself() {
         "stretching_time": "0.1 s", "lowering_time": "0.1 s", "drawing_time": "0.1 s", "settling_time": "0.1 s",
     }});
     let bed = drape(json!({"scene": scene, "element_size": 0.004})).unwrap();
-    assert_eq!(bed.attributes["without_bed"], json!(false));
+    assert_eq!(bed.attributes["without_bed"], Value::Null);
     for (name, offset) in [("ply_1", 0.5 * PLY), ("ply_2", 1.5 * PLY)] {
         for x in last(&bed, name) {
             assert!((norm(x) - 0.05 - offset).abs() < 2e-8, "{name}: {x:?}");
