@@ -42,41 +42,57 @@ impl Field<'_> {
         }
     }
 
-    /// From a place along a family, to the side of `towards`: up to the first place off the ply, or round to the beginning.
-    fn followed(&self, from: Point, family: usize, towards: Point) -> Vec<Point> {
+    /// Where a step along a family leads, and with which direction, by the fourth order rule of Runge and Kutta. `before`: the direction so far.
+    fn stepped(&self, at: Point, before: Point, family: usize, step: f64) -> (Point, Point) {
+        let ahead = |d: Point, share: f64| [0, 1].map(|i| at[i] + share * step * d[i]);
+        let a = self.direction(at, family, before);
+        let b = self.direction(ahead(a, 0.5), family, a);
+        let c = self.direction(ahead(b, 0.5), family, b);
+        let d = self.direction(ahead(c, 1.0), family, c);
+        let mean = [0, 1].map(|i| (a[i] + 2.0 * (b[i] + c[i]) + d[i]) / 6.0);
+        (ahead(mean, 1.0), d)
+    }
+
+    /// From a place along a family, to the side of `towards`: up to the edge of the ply, or round to the beginning. And whether it came to the edge.
+    fn followed(&self, from: Point, family: usize, towards: Point) -> (Vec<Point>, bool) {
         let mut line = vec![from];
         let (mut at, mut before) = (from, self.direction(from, family, towards));
         for k in 0..MOST_STEPS {
-            // The fourth order rule of Runge and Kutta.
-            let ahead = |d: Point, share: f64| [0, 1].map(|i| at[i] + share * self.step * d[i]);
-            let a = self.direction(at, family, before);
-            let b = self.direction(ahead(a, 0.5), family, a);
-            let c = self.direction(ahead(b, 0.5), family, b);
-            let d = self.direction(ahead(c, 1.0), family, c);
-            let mean = [0, 1].map(|i| (a[i] + 2.0 * (b[i] + c[i]) + d[i]) / 6.0);
-            (at, before) = (ahead(mean, 1.0), d);
+            let (next, direction) = self.stepped(at, before, family, self.step);
+            if !(self.inside)(next) {
+                let (mut short, mut long) = (0.0, self.step);
+                for _ in 0..HALVINGS {
+                    let step = 0.5 * (short + long);
+                    match (self.inside)(self.stepped(at, before, family, step).0) {
+                        true => short = step,
+                        false => long = step,
+                    }
+                }
+                if short > 0.0 {
+                    line.push(self.stepped(at, before, family, short).0);
+                }
+                return (line, true);
+            }
+            (at, before) = (next, direction);
             let back = (at[0] - from[0]).fixed_hypot(at[1] - from[1]);
             if k > 3 && back < 0.6 * self.step {
                 line.push(from);
                 break;
             }
             line.push(at);
-            if !(self.inside)(at) {
-                break;
-            }
         }
-        line
+        (line, false)
     }
 
     /// Both ways from a place, as one line.
     fn through(&self, from: Point, family: usize) -> Vec<Point> {
         let along = self.direction(from, family, [1.0, 0.0]);
-        let ahead = self.followed(from, family, along);
-        if ahead.last().is_some_and(|last| (self.inside)(*last)) {
+        let (ahead, ends) = self.followed(from, family, along);
+        if !ends {
             // Round to its beginning, or on for ever.
             return ahead;
         }
-        let back = self.followed(from, family, along.map(|v| -v));
+        let (back, _) = self.followed(from, family, along.map(|v| -v));
         let mut line: Vec<Point> = back.into_iter().rev().collect();
         line.pop();
         line.extend(ahead);
@@ -84,7 +100,7 @@ impl Field<'_> {
     }
 
     /// Curves of a family: at multiples of `distance` along the curve that crosses them in the middle of the ply, and then through each place that is farther
-    /// than that from all curves before it. The last place of a curve may lie off the ply.
+    /// than that from all curves before it.
     ///
     /// # Errors
     /// When there would be too many.
@@ -94,7 +110,7 @@ impl Field<'_> {
         };
         let along = self.direction(*middle, family, [1.0, 0.0]);
         let across = [-along[1], along[0]];
-        let sides = [across, across.map(|v| -v)].map(|t| self.followed(*middle, 1 - family, t));
+        let sides = [across, across.map(|v| -v)].map(|t| self.followed(*middle, 1 - family, t).0);
         let lengths = sides.each_ref().map(|s| self.step * (s.len() - 1) as f64);
         let too_many = |lines: f64| TooMany {
             lines,

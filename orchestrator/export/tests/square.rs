@@ -200,7 +200,15 @@ fn steered_fibres_have_the_closed_form_of_each_place_in_tables_and_drawings() {
                 let [a, b] = [x[i] - x[i - 1], y[i] - y[i - 1]];
                 let angle = steered(0.0, 0.5 * (x[i] + x[i - 1])).to_radians();
                 // Across the chord of a step, of which the curve bends by less than 0.1 rad.
-                assert!((b * angle.cos() - a * angle.sin()).abs() < 1e-3 * a.hypot(b) + 1e-9);
+                let off = (b * angle.cos() - a * angle.sin()).abs();
+                assert!(
+                    off < 1e-3 * a.hypot(b) + 1e-9,
+                    "{off} of {} at {}, {}: point {i} of {}",
+                    a.hypot(b),
+                    x[i],
+                    y[i],
+                    x.len()
+                );
                 checked += 1;
             }
         }

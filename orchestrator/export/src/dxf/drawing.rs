@@ -70,7 +70,7 @@ impl Drawing {
         self.plane(layer, points, true);
     }
 
-    /// A straight line in the plane of the drawing, through these points.
+    /// An open line in the plane of the drawing, through these points.
     pub fn open_plane(&mut self, layer: usize, points: &[Vec3], straight: bool) {
         match points {
             // The ends are enough.

@@ -143,7 +143,7 @@ pub struct Sheet {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fibre_2: Option<f64>,
     /// Of a ply whose fibres are steered, instead of `fibre_1` and `fibre_2`: `[[x, y, angle], ..]` (m, m, rad), points of the flat ply with the direction of
-    /// its first fibres. Between them it follows as [`crate::steering`] says; the second fibres lie a quarter turn on.
+    /// its first fibres. Between them cosine and sine of the doubled angle are linear in triangles; the second fibres lie a quarter turn on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steering: Option<Vec<[f64; 3]>>,
     /// `[[x, y], ..]` (m), of the whole flat ply, whatever part of it the run has.

@@ -168,7 +168,7 @@ fn a_sharp_turn_is_told_where_the_ply_lies_and_not_in_its_hole() {
             .map(|k| [r * turn(k).cos(), r * turn(k).sin()])
             .collect()
     };
-    let ring = Region::new(circle(0.19), vec![circle(0.1)]).unwrap();
+    let ring = Region::new(circle(0.19), vec![circle(0.102)]).unwrap();
     assert_eq!(field.sharp_turn(Some(&ring)), None);
     let disc = Region::new(circle(0.19), Vec::new()).unwrap();
     let turn = field.sharp_turn(Some(&disc)).unwrap();
