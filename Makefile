@@ -21,6 +21,9 @@ QUICK := -p plyflow-abi -p plyflow-model -p plyflow-files -p plyflow-fixed -p pl
 CHECKED := $(foreach crate,mechanics kernels,$(foreach look,debug-assertions=true overflow-checks=true codegen-units=16 opt-level=2,\
   --config profile.release.package.plyflow-$(crate).$(look)))
 
+# With these two beside them the dependencies of the two have the features that the whole workspace gives them, and are not compiled once more.
+SAME_FEATURES := -p plyflow -p plyflow-python-law
+
 .PHONY: help build demo check test checked long fuzz hard-cases templates wheel lint bench book docs pictures clean
 
 help: ## show this list
@@ -54,7 +57,7 @@ test: ## run all tests, also with VTK's own reader, Chromium and a step in C
 
 checked: ## run the tests of mechanics and kernels with debug assertions and overflow checks: minutes
 	@scripts/setup
-	$(CARGO) test $(CARGO_FLAGS) $(CHECKED) -p plyflow-mechanics -p plyflow-kernels --tests
+	. ./.tools/env && scripts/run-tests --of mechanics --of kernels $(CARGO_FLAGS) $(CHECKED) $(SAME_FEATURES) -p plyflow-mechanics -p plyflow-kernels --tests
 
 long: ## run the tests that take many minutes
 	@scripts/setup

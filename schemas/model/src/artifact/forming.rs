@@ -23,8 +23,8 @@ pub struct Forming {
     /// Whether sheets touch what really lies under them: where plies below end, a ply lies lower than its `offset` by their thickness. Left out: no.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub contact_by_place: bool,
-    /// Whether there is no machine bed under tool and plies, as in a press and in a stamping: what hangs beside the tool has nothing there to lie on, and
-    /// its distance from the tool is not judged. Left out: no.
+    /// Whether there is no machine bed under tool and plies, as in a press, in a stamping, and under a single film where the scene says so: what hangs
+    /// beside the tool has nothing there to lie on, and its distance from the tool is not judged. Left out: no.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub without_bed: bool,
     /// The mirror planes beside which a part was computed. Meshes, fields and energies are the whole's all the same.

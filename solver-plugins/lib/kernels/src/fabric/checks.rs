@@ -255,7 +255,8 @@ pub(super) fn compression_table(
     }
     if y[1] <= 0.0 {
         return Err(format!(
-            "{path}.stresses[1]: given {} Pa at {}; expected a stress above 0 (sizes): fibres without any stiffness in compression have              no stable straight state",
+            "{path}.stresses[1]: given {} Pa at {}; expected a stress above 0 (sizes): fibres without any stiffness in compression have \
+             no stable straight state",
             y[1],
             COMPRESSION.place(x[1])
         ));
@@ -272,7 +273,8 @@ pub(super) fn compression_table(
     let slope = |i: usize| (y[i] - y[i - 1]) / (x[i] - x[i - 1]);
     match (1..x.len()).find(|i| slope(*i) > modulus * (1.0 + 1e-9)) {
         Some(i) => Err(format!(
-            "{path}.stresses[{i}]: given {} Pa at {}, which rises by {} Pa for each strain; expected at most the modulus in tension, {modulus} Pa: fibres              are not stiffer in compression. Check the units",
+            "{path}.stresses[{i}]: given {} Pa at {}, which rises by {} Pa for each strain; expected at most the modulus in tension, {modulus} Pa: fibres \
+             are not stiffer in compression. Check the units",
             y[i],
             COMPRESSION.place(x[i]),
             slope(i)
