@@ -73,7 +73,7 @@ def steered():
     for layer, points in flat:
         if layer in COLOURS:
             axes.plot(WIDTH / 2 + scale * points[:, 0], 10 + HEIGHT / 2 - scale * points[:, 1], color=COLOURS[layer], linewidth=1.6 if layer == "ply_1" else 0.8)
-    view = scene3d.View((WIDTH, HEIGHT), scene3d.Camera(-62, 38, (0.0, 0.0, 0.02), 0.25))
+    view = scene3d.View((WIDTH, HEIGHT), scene3d.Camera(-62, 38, (0.0, 0.0, 0.02), 0.31))
     view.surface(formed.points("ply_1"), formed.cells("ply_1"), (0.93, 0.92, 0.88))
     for layer, line in on_part:
         view.lines(np.stack([line[:-1], line[1:]], axis=1), COLOURS[layer], 2.0 if layer == "ply_1" else 1.2, lift=OVER_PLY)

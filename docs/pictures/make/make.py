@@ -28,7 +28,7 @@ PICTURES = {
 }
 # Largest files, in bytes.
 LARGEST = {".png": 250_000, ".svg": 150_000}
-LARGEST_TOGETHER = 3_100_000
+LARGEST_TOGETHER = 3_200_000
 
 
 def main(names: list[str]) -> int:
