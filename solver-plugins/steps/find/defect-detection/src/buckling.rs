@@ -38,7 +38,7 @@ impl Known {
         let has = |name: &str| body.fields.iter().any(|f| f.name == name);
         let all = FORCES.iter().chain([&PRESSURE]);
         let missing: Vec<&str> = all.copied().filter(|f| !has(f)).collect();
-        let straight = sheet.laid().and_then(|l| Some(l.straight()?));
+        let straight = sheet.laid().and_then(|l| l.straight());
         let axis = straight.filter(|_| missing.is_empty());
         let axis = axis.map(|[first, second]| first_axis(first, second));
         let axis = axis.ok_or_else(|| {

@@ -71,8 +71,7 @@ pub fn build_stamping(
     // Plies lie on parts, not in them: a micrometre that a part's field is off would throw a ply up that only rests there.
     model.clear_rigid();
     let reference = model.start().clone();
-    let errors = drawn.iter().map(|d| (d.name.clone(), d.error));
-    let field_errors = errors.collect();
+    let field_errors = drawn.iter().map(|d| (d.name.clone(), d.error)).collect();
     let mut tool_warnings = tool.warnings;
     tool_warnings.extend(without_partner(&drawn, &stops));
     Ok(Forming {
