@@ -92,7 +92,7 @@ fn shown(path: &Utf8Path) -> Utf8PathBuf {
 
 /// Resolves a parameter of type `scene`.
 ///
-/// `straight_fibres`: whether the step cannot do with steered fibres.
+/// `straight_fibres`: whether the step cannot compute steered fibres.
 pub fn resolve(
     resolver: &mut Resolver<'_>,
     node: &Node,
@@ -173,7 +173,7 @@ fn file_of<'n>(
     Some(file)
 }
 
-/// The canonical form of a scene. `straight_fibres`: whether the step cannot do with steered fibres.
+/// The canonical form of a scene. `straight_fibres`: whether the step cannot compute steered fibres.
 pub fn scene_value(
     resolver: &mut Resolver<'_>,
     node: &Node,
