@@ -234,6 +234,7 @@ impl Apart<'_> {
         let mut worst: Option<Nearest> = None;
         for (a, b) in [(one, other), (other, one)] {
             let places = places(&a.mesh);
+            let is_behind = behind(b);
             for t in &times {
                 let (from, to) = (a.shift(*t), b.shift(*t));
                 if *t > 0.0 && from == a.shift(0.0) && to == b.shift(0.0) {
@@ -241,7 +242,7 @@ impl Apart<'_> {
                 }
                 for p in &places {
                     let at = add(*p, from);
-                    if behind(b, sub(at, to)) {
+                    if is_behind(sub(at, to)) {
                         continue;
                     }
                     let distance = b.field.distance_and_gradient(sub(at, to)).0;
@@ -266,12 +267,14 @@ impl Apart<'_> {
     }
 }
 
-/// Whether a place is behind the back of a part as it is drawn, where the walls of its field go on and the part does not.
-pub fn behind(part: &Drawn, p: Vec3) -> bool {
-    let bounds = part.mesh.bounds();
-    match part.side {
-        Side::Below => p[2] < bounds[0][2],
-        Side::Above => p[2] > bounds[1][2],
+/// Tells whether a place is behind the back of a part as it is drawn, where the walls of its field go on and the part does not. All points of the
+/// part are looked at once, not for each place.
+pub fn behind(part: &Drawn) -> impl Fn(Vec3) -> bool {
+    let [low, high] = part.mesh.bounds();
+    let side = part.side;
+    move |p| match side {
+        Side::Below => p[2] < low[2],
+        Side::Above => p[2] > high[2],
     }
 }
 

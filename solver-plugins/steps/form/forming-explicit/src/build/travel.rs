@@ -71,7 +71,8 @@ fn closing(one: &Drawn, other: &Drawn, end: f64) -> Option<f64> {
 /// The least distance (m) of places, moved by `shift`, from a part where it is drawn.
 fn least(places: &[Vec3], shift: Vec3, part: &Drawn) -> f64 {
     let at = places.iter().map(|p| add(*p, shift));
-    let beside = at.filter(|p| !behind(part, *p));
+    let is_behind = behind(part);
+    let beside = at.filter(|p| !is_behind(*p));
     let distance = |p| part.field.distance_and_gradient(p).0;
     beside.map(distance).fold(f64::INFINITY, f64::min)
 }
