@@ -90,6 +90,25 @@ def unidirectional():
     return style.save_svg(figure, "unidirectional")
 
 
+def crossing():
+    """A fabric whose families cross at 60 degrees, pulled at three angles: membranes and the closed form of the law."""
+    place = runs.run("coupons/crossing/workflow")
+    figure, panels = plt.subplots(1, 2, figsize=(7, 2.8), layout="constrained")
+    ways = (("bisector", "families at ±30°", BLUE), ("off_20", "at 20° and 80°", ORANGE), ("off_75", "at 75° and 135°", style.GREEN))
+    for axes, name, label in zip(panels, ("shear_angle", "strain"), ("shear of the fibres (deg)", "strain along the pull (%)")):
+        unit = 180 / np.pi if name == "shear_angle" else 100
+        for step, words, colour in ways:
+            run = runs.artifact(place, step)
+            whole = run.array("curves/closed_form/force")[-1]
+            axes.plot(run.array("curves/closed_form/force") / whole, run.array(f"curves/closed_form/{name}") * unit, color=colour,
+                      linewidth=1.2, label=f"{words}, to {whole:.0f} N/m")
+            axes.plot(run.array("curves/run/force") / whole, run.array(f"curves/run/{name}") * unit, "o", color=colour, markersize=3.2,
+                      markerfacecolor="white", markeredgewidth=0.9)
+        axes.set(xlabel="share of the force", ylabel=label, xlim=(0, None))
+    panels[1].legend(loc="upper left")
+    return style.save_svg(figure, "crossing")
+
+
 def hysteresis():
     """Loops of shear, of shear under tension and of bending, with friction between the yarns."""
     place = runs.run("coupons/hysteresis/workflow")

@@ -12,13 +12,14 @@ use plyflow_files::book::{self, Row};
 use plyflow_files::dxf::{Contours, Fineness, MOST_DRAWN};
 use plyflow_files::flaw::{Flaw, plain};
 use plyflow_files::open::{self, MOST_WRITTEN};
-use plyflow_files::table::{Amount, Cell};
+use plyflow_files::table::Cell;
 use plyflow_files::text::shown;
 use plyflow_files::{drawn, turn};
 use plyflow_model::book::PlyBook;
 use plyflow_model::contour::{Contour, Drawing};
 use plyflow_model::outline::Point;
 use plyflow_model::units::{Angle, Dimension, Length, si_number, si_text};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 use std::rc::Rc;
@@ -383,7 +384,11 @@ impl Filler<'_> {
         }
         let at = moved(&row.angle.span, of.base);
         add("fibre_1", text(&row.angle.text, &at));
-        add("fibre_2", text(across(&row.angle), &at));
+        // A quarter turn on, until the material is known (`cross`).
+        add(
+            "fibre_2",
+            text(turned(&row.angle.text, row.angle.si, FRAC_PI_2), &at),
+        );
         Some(Node {
             kind: Kind::Map(entries),
             span,
@@ -545,13 +550,44 @@ fn shape_of(
     shape
 }
 
-/// The direction a quarter turn on from an angle, as a scene writes it.
-fn across(angle: &Amount) -> String {
+/// The direction that lies `by` (rad) on from an angle of `si` (rad), which is written as `given`: as a scene writes it.
+fn turned(given: &str, si: f64, by: f64) -> String {
     let degrees = ["deg", "\u{b0}"]
         .iter()
-        .find_map(|u| angle.text.strip_suffix(u)?.trim().parse::<f64>().ok());
+        .find_map(|u| given.strip_suffix(u)?.trim().parse::<f64>().ok());
     match degrees {
-        Some(degrees) => format!("{} deg", si_number(degrees + 90.0)),
-        None => Angle(angle.si + FRAC_PI_2).to_string(),
+        // 90 deg is 90 deg again, and not what rounding has made of it on the way through radians.
+        Some(degrees) => {
+            let on = (by.to_degrees() * 1e9).round() / 1e9;
+            format!("{} deg", si_number(degrees + on))
+        }
+        None => Angle(si + by).to_string(),
+    }
+}
+
+/// Lays the second fibres of plies whose book has one angle for both families as their material says.
+pub(crate) fn cross(scene: &mut Node, materials: &[Option<Value>]) {
+    let Some(Entry { value, .. }) = entry_mut(scene, "sheets") else {
+        return;
+    };
+    let Kind::List(sheets) = &mut value.kind else {
+        return;
+    };
+    for (sheet, material) in sheets.iter_mut().zip(materials) {
+        let crossing = material
+            .as_ref()
+            .and_then(|m| m["with"]["crossing"].as_f64());
+        let first = sheet.get("fibre_1").cloned();
+        let (Some(by), Some(first), Some(second)) = (crossing, first, entry_mut(sheet, "fibre_2"))
+        else {
+            continue;
+        };
+        // Both stand at one place: the book has said one.
+        let Some(given) = first.text().filter(|_| first.span == second.value.span) else {
+            continue;
+        };
+        if let Ok(angle) = given.parse::<Angle>() {
+            second.value = text(turned(given, angle.si(), by), &first.span);
+        }
     }
 }

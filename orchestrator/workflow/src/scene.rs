@@ -186,20 +186,23 @@ pub fn scene_value(
         return None;
     }
     Checker::new(&SCENE, at.source, resolver.problems).check(node, "the scene");
-    let filled = plies::fill(node, at.source, resolver.problems);
-    let at = &match &filled {
-        Some(filled) => Place {
-            source: &filled.source,
-            ..at.clone()
-        },
-        None => at.clone(),
+    let filled = plies::fill(node, at.source, resolver.problems).unwrap_or_else(|| plies::Filled {
+        scene: node.clone(),
+        source: at.source.clone(),
+        sound: true,
+    });
+    let (mut node, source) = (filled.scene, filled.source);
+    let at = &Place {
+        source: &source,
+        ..at.clone()
     };
-    let node = filled.as_ref().map_or(node, |f| &f.scene);
     let found = resolver.problems.places_from(before);
-    let files = stl_files(resolver, node, at);
-    let materials = materials(resolver, node, at);
+    let files = stl_files(resolver, &node, at);
+    let materials = materials(resolver, &node, at);
+    plies::cross(&mut node, &materials);
+    let node = &node;
     // Rules look at all sheets: without those of a book that could not be read they would find what is none.
-    if filled.as_ref().is_none_or(|f| f.sound) {
+    if filled.sound {
         scene_rules::tell(node, &materials, &found, at.source, resolver.problems);
     }
     steered(node, at, straight_fibres, resolver.problems);

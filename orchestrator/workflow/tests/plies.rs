@@ -86,6 +86,41 @@ fn a_book_is_the_scene_that_lists_its_plies_to_the_last_bit() {
 }
 
 #[test]
+fn a_book_has_one_angle_and_the_material_says_where_the_second_family_lies() {
+    let crossed = |study: Study| {
+        study.mutate(
+            "materials/fabric.yaml",
+            "fibre_modulus:",
+            "crossing: 60 deg\n  fibre_modulus:",
+        );
+        study
+    };
+    let listed = LISTED
+        .replace("fibre_2: 135 deg", "fibre_2: 105 deg")
+        .replace(
+            "fibre_1: -45 deg\n    fibre_2: 45 deg",
+            "fibre_1: -45 deg\n    fibre_2: 15 deg",
+        )
+        .replace("fibre_2: 90 deg", "fibre_2: 60 deg");
+    let [book, listed] = [ENTRY, &listed].map(|plies| {
+        let found = crossed(study(plies)).load();
+        found.unwrap_or_else(|e| panic!("{}", e.render(false)))
+    });
+    let [a, b] = [&book, &listed].map(|w| step(w, "coarse"));
+    assert_eq!(a.parameters, b.parameters);
+    // A scene that says both says it wrong, in its line.
+    let told = told(&crossed(study(LISTED)));
+    for part in [
+        "`fibre_2` lies 90 deg counter-clockwise",
+        "cross at 60 deg",
+        "`fibre_2: 105 deg`",
+        "scene.yaml",
+    ] {
+        assert!(told.contains(part), "'{part}' in: {told}");
+    }
+}
+
+#[test]
 fn all_plies_are_moved_and_those_without_an_outline_are_turned() {
     let centred = ENTRY.to_owned() + "      centre: [-100 mm, 1 mm]\n";
     let moved = study(&centred);

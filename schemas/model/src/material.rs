@@ -35,6 +35,22 @@ pub struct Material {
     pub with: serde_json::Map<String, serde_json::Value>,
 }
 
+impl Material {
+    /// Angle (rad) at which the fibre families of its law cross, counter-clockwise from the first to the second, where its `with` says it as
+    /// `crossing`: as a number (rad), or with a unit.
+    pub fn crossing(&self) -> Option<f64> {
+        let given = self.with.get("crossing")?;
+        let of_text = || {
+            given
+                .as_str()?
+                .parse::<Angle>()
+                .ok()
+                .map(|angle| angle.si())
+        };
+        given.as_f64().or_else(of_text)
+    }
+}
+
 /// Shear angles from which a fabric wrinkles. A sign without one is not judged.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

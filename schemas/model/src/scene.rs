@@ -249,9 +249,13 @@ impl Sheet {
         }
     }
 
-    /// What mirror planes do to its fibre families, the same for both planes; `None` where its fibres lie askew to them, or are steered.
+    /// What mirror planes do to its fibre families, the same for both planes; `None` where its fibres lie askew to them, are steered, or do not cross
+    /// at a right angle.
     pub fn families(&self) -> Option<Families> {
         let [first, second] = self.fibres()?;
+        if Laid::Straight([first, second]).crossing().is_some() {
+            return None;
+        }
         let axis = first_axis(first, second);
         let (x, y) = (axis.fixed_cos().abs(), axis.fixed_sin().abs());
         if x.min(y) < FIBRES_APART {

@@ -373,6 +373,10 @@ pub fn first_axis(fibre_1: f64, fibre_2: f64) -> f64 {
     }
 }
 
+/// How far (rad) the angle between the fibre families may be from a right one, or from another that a material tells: rounding of angles that are
+/// written in degrees.
+pub const SQUARE: f64 = 1e-6;
+
 /// Directions of both fibre families of a flat ply.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Laid {
@@ -406,6 +410,15 @@ impl Laid {
     pub fn axis_at(&self, place: Point) -> f64 {
         let [first, second] = self.at(place);
         first_axis(first, second)
+    }
+
+    /// Angle (rad, 0 to pi) from the first family to the second, counter-clockwise; `None` where they cross at a right angle.
+    pub fn crossing(&self) -> Option<f64> {
+        let Self::Straight([first, second]) = self else {
+            return None;
+        };
+        let between = (second - first).rem_euclid(PI);
+        ((between - FRAC_PI_2).abs() > SQUARE).then_some(between)
     }
 
     /// In the middle of a cell with these corners (m): the mean of them. Of the corners, x and y count.

@@ -41,11 +41,19 @@ struct Answers {
     process: StudyProcess,
 }
 
-/// A material of the plies: how the scene names it, its thickness (m) and its areal mass (kg/m2), where they are known.
+/// A material of the plies: how the scene names it, and what is known of it.
 type Material = (String, Sheet);
 
-/// Thickness (m) and areal mass (kg/m2) of a material, where they are known.
-type Sheet = [Option<f64>; 2];
+/// What is known of a material.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sheet {
+    /// Thickness (m).
+    thickness: Option<f64>,
+    /// Areal mass (kg/m2).
+    areal_mass: Option<f64>,
+    /// Angle from its first fibre family to its second one (rad), where it is not a right one.
+    crossing: Option<f64>,
+}
 
 /// The files of a new study by their paths in its folder, and what to say of it.
 ///
@@ -71,7 +79,9 @@ pub fn files(
         let film = text_of(&materials.join("stretchlon-ht350.yaml"))?;
         files.push((Utf8PathBuf::from(FILM), film));
     }
-    let known = |k: usize| sheets.iter().filter_map(move |s| s[k]);
+    let thickest = sheets.iter().filter_map(|s| s.thickness);
+    let lightest = sheets.iter().filter_map(|s| s.areal_mass);
+    let crossing = given.as_ref().and_then(|g| g.1.crossing);
     let study = Study {
         name: args.name.clone(),
         tool: from_folder(folder, Utf8Path::new(&of.tool))?,
@@ -80,7 +90,8 @@ pub fn files(
         plies,
         material: given.map_or(String::new(), |g| g.0),
         // The thickest, so that it fits into the gaps, and the lightest, so that no mass is added to it.
-        sheet: [known(0).reduce(f64::max), known(1).reduce(f64::min)],
+        sheet: [thickest.reduce(f64::max), lightest.reduce(f64::min)],
+        crossing: crossing.map_or(90.0, |angle| (1e6 * angle.to_degrees()).round() / 1e6),
         angles: angles(&args.study.angles)?,
         process: of.process,
     };
@@ -360,19 +371,25 @@ fn take_material(
     Ok((place, sheet))
 }
 
-/// Thickness (m) and areal mass (kg/m2) of a material's text, where they stand in lines of their own.
+/// What a material's text says of it, where thickness and areal mass stand in lines of their own, and the crossing in one, or between others.
 fn sheet_of(text: &str) -> Sheet {
+    let bare = || text.lines().filter_map(|l| l.split(" #").next());
     let value = |key: &str, dimension| {
-        let line = text
-            .lines()
-            .find_map(|l| l.strip_prefix(key)?.strip_prefix(':'))?;
-        let bare = line.split(" #").next()?.trim();
-        parse_quantity(bare, dimension).ok()
+        let line = bare().find_map(|l| l.strip_prefix(key)?.strip_prefix(':'))?;
+        parse_quantity(line.trim(), dimension).ok()
     };
-    [
-        value("thickness", Dimension::Length),
-        value("areal_mass", Dimension::ArealMass),
-    ]
+    let crossing = bare().find_map(|l| {
+        let (before, after) = l.split_once("crossing:")?;
+        let is_key = before.is_empty() || before.ends_with([' ', ',', '{']);
+        let value = after.split([',', '}']).next()?.trim();
+        let angle = parse_quantity(value, Dimension::Angle).ok();
+        angle.filter(|_| is_key && !before.contains('#'))
+    });
+    Sheet {
+        thickness: value("thickness", Dimension::Length),
+        areal_mass: value("areal_mass", Dimension::ArealMass),
+        crossing,
+    }
 }
 
 /// The path of a file as it is named from a folder that may not be there yet.

@@ -85,6 +85,7 @@ pub fn catalog() -> Fake {
         r#"{"name": "rf4", "version": "1", "kind": "element", "role": "element", "summary": "s"}"#,
         r#"{"name": "material-fabric", "version": "1", "kind": "material", "role": "material", "summary": "s",
             "parameters": {"fibre_modulus": {"type": "quantity", "dimension": "pressure", "required": true, "exclusive_minimum": "0 Pa", "doc": "Along the fibres."},
+                           "crossing": {"type": "quantity", "dimension": "angle", "doc": "From family 1 to family 2."},
                            "shear": {"type": "quantity", "dimension": "force_per_length", "default": "112.19 N/m"}}}"#,
         r#"{"name": "material-marlow", "version": "1", "kind": "material", "role": "material", "summary": "s",
             "parameters": {"modulus": {"type": "quantity", "dimension": "pressure", "default": "3 MPa"}}}"#,

@@ -1,11 +1,13 @@
 //! Rules of single sheets: names, sizes, fibres.
 
-use crate::fault::{Fault, Path, Rule, Shown};
+use crate::fault::{Fault, Path, Rule, Shown, degrees};
+use crate::material::MaterialEntry;
 use crate::outline::{ContourName, OutlineError, Region};
 use crate::process::Process;
 use crate::rules::known::Known;
 use crate::rules::steering;
 use crate::scene::{FibreDirection, Sheet, SheetKind};
+use crate::steering::SQUARE;
 use crate::text::is_word;
 use crate::units::si_number;
 
@@ -140,9 +142,34 @@ fn outline(sheet: &Sheet, at: &Path) -> Option<Fault> {
     Some(fault)
 }
 
-/// The families must cross.
+/// The families must cross, and where the material says at which angle, at that one.
 fn fibres(sheet: &Sheet, path: Path) -> Option<Fault> {
     sheet.fibre_2?;
+    cross(sheet, path.clone()).or_else(|| agree(sheet, path))
+}
+
+/// Whether the families lie as the material's law has them.
+fn agree(sheet: &Sheet, path: Path) -> Option<Fault> {
+    let MaterialEntry::Inline(material) = &sheet.material else {
+        return None;
+    };
+    let crossing = material.crossing()?;
+    let [first, second] = sheet.fibres()?;
+    // The law's second family follows its first one counter-clockwise: turned by 180 deg it would be the same line, but scenes are to be read.
+    let given = (second - first).rem_euclid(std::f64::consts::TAU);
+    ((given - crossing).abs() > SQUARE).then(|| {
+        let text = format!(
+            "`fibre_2` lies {} counter-clockwise from `fibre_1`, and the families of the material `{}` cross at {} (`with.crossing`)",
+            degrees(given),
+            material.name,
+            degrees(crossing)
+        );
+        Fault::text(Rule::Fibres, path, text)
+            .expected(format!("`fibre_2: {}`", degrees(first + crossing)))
+    })
+}
+
+fn cross(sheet: &Sheet, path: Path) -> Option<Fault> {
     let [first, second] = sheet.fibres()?;
     // A fibre has no sense: directions 180 deg apart are the same.
     let apart = (second - first).to_degrees().rem_euclid(180.0);

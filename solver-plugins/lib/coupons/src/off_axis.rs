@@ -71,7 +71,8 @@ impl Step for Plugin {
     const MANIFEST: &'static str = include_str!("off_axis/manifest.json");
 
     fn run(host: &Host) -> Result<(), StepError> {
-        let p: Parameters = host.parameters()?;
+        let mut p: Parameters = host.parameters()?;
+        p.common.any_crossing = true;
         crate::run::with_threads(host, || test(host, &p))
     }
 }

@@ -5,11 +5,13 @@ use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::component::{
     ElementField, ElementInstance, MaterialInstance, element_fields,
 };
+use plyflow_mechanics::crossed::Crossed;
 use plyflow_mechanics::mesh::QuadMesh;
 use plyflow_mechanics::model::{Fixed, Model, StepSettings};
 use plyflow_mechanics::sheet::{Pressed, SheetSpec};
 use plyflow_model::budget::{self, Wanted};
 use plyflow_model::material::Material;
+use plyflow_model::steering::Laid;
 use plyflow_sdk::{Host, StepError};
 use serde::Deserialize;
 
@@ -42,6 +44,9 @@ pub struct Common {
     pub time_step: Option<f64>,
     /// Share of the critical step that is used.
     pub step_safety: f64,
+    /// Whether the test takes a fabric whose families do not cross at a right angle.
+    #[serde(skip)]
+    pub any_crossing: bool,
     /// Mass-proportional damping (1/s).
     #[serde(default)]
     pub damping: f64,
@@ -77,6 +82,25 @@ impl Common {
         Ok(budget::allow(wanted)?)
     }
 
+    /// How the families of the material cross, where they do not at a right angle.
+    ///
+    /// # Errors
+    /// When the test takes no such material.
+    fn crossed(&self) -> Result<Option<Crossed>, StepError> {
+        let crossing = self.material.crossing();
+        let crossing = crossing.and_then(|p| Laid::Straight([0.0, p]).crossing());
+        match crossing {
+            Some(p) if !self.any_crossing => Err(format!(
+                "material: given '{}', whose fibre families cross at {:.4} deg; expected one whose families cross at a right angle: this test has its \
+                 specimen's sides, or its closed forms, along both. coupon-off-axis takes any",
+                self.material.name,
+                p.to_degrees()
+            )
+            .into()),
+            other => Ok(other.map(Crossed::new)),
+        }
+    }
+
     /// Mass per area (kg/m2).
     pub fn areal_mass(&self) -> f64 {
         self.material.areal_mass.si()
@@ -103,6 +127,8 @@ pub struct Specimen {
     pub mesh: QuadMesh,
     /// Fields of the element.
     pub fields: Vec<ElementField>,
+    /// How the families of its material cross, where they do not at a right angle.
+    crossed: Option<Crossed>,
 }
 
 /// The element instance of the common parameters.
@@ -110,6 +136,7 @@ pub struct Specimen {
 /// # Errors
 /// When a component is missing or refuses its parameters.
 pub fn element(host: &Host, p: &Common) -> Result<(ElementInstance, Vec<ElementField>), StepError> {
+    p.crossed()?;
     let mut with = serde_json::Value::Object(p.material.with.clone());
     with["thickness"] = p.thickness().into();
     with["areal_mass"] = p.areal_mass().into();
@@ -173,6 +200,7 @@ impl Specimen {
     /// # Errors
     /// When a component refuses or the meshes make no model.
     pub fn of_sheets(host: &Host, p: &Common, sheets: &[Stacked]) -> Result<Self, StepError> {
+        let crossed = p.crossed()?;
         let mut mesh = QuadMesh::default();
         let mut specs = Vec::new();
         let mut fields = Vec::new();
@@ -209,11 +237,19 @@ impl Specimen {
             model,
             mesh,
             fields,
+            crossed,
         })
     }
 
     /// Values of a field of the element: per cell, or per point for patch fields. Needs a step that kept fields (a frame or a sample).
     pub fn values(&self, field: &ElementField) -> Vec<f64> {
+        let own = |name: &str| Some(self.own_values(self.fields.iter().find(|f| f.name == name)?));
+        let of_families = self.crossed.and_then(|c| c.field(&field.name, own));
+        of_families.unwrap_or_else(|| self.own_values(field))
+    }
+
+    /// The same as the element tells it.
+    fn own_values(&self, field: &ElementField) -> Vec<f64> {
         let of = |sheet: usize| {
             if field.patch {
                 self.model.patch_field(sheet, field.row)

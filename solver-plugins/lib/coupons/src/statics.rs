@@ -46,7 +46,7 @@ pub fn rest(
     }
     Err(format!(
         "load step {} of {} is not at rest after {} steps: forces out of balance are {:.1e} of the \
-         loads, expected {:.1e}. Allow more cycles, use more load steps, or a coarser mesh",
+         loads, expected {:.1e}. Allow more cycles, use more load steps, a smaller step_safety, or a coarser mesh",
         step.number, step.of, relaxed.cycles, relaxed.residual, tolerance.balance
     )
     .into())

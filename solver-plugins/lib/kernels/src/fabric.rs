@@ -7,13 +7,14 @@
 //! (in compression a share of it, or instead the integral of a curve over `1 - l`, [`compression`]):
 //!
 //! a picture frame does the work `F_norm cos g dg = F_norm ds` per undeformed area, so this energy
-//! gives back the measured curve exactly. `hypoelastic` is the thesis' incremental form (eqs
+//! gives back the measured curve exactly. Families may cross at any angle ([`crossing`]). `hypoelastic` is the thesis' incremental form (eqs
 //! 3.10-3.23). Bending is decoupled: a potential of the curvatures k11, k22 of the fibre families
 //! ([`bending`]). Stretches are floored at 0.001, so that no state gives NaN.
 
 mod bending;
 mod checks;
 mod compression;
+mod crossing;
 mod cubic;
 mod fibre_energy;
 mod hypoelastic;
@@ -75,7 +76,7 @@ impl Material for Fabric {
                     energy: &mut *b.energy,
                     tangent,
                 };
-                bending::rub(sliders, b.lanes, b.curvature, of);
+                bending::rub(sliders, law.crossing.as_ref(), b.lanes, b.curvature, of);
             }
         }
     }
@@ -126,7 +127,9 @@ fn membrane_kernel<V: Lanes>(
     match &f.shear.yarn {
         Yarn::Polynomial(yarn) => of_yarn!(&**yarn, false),
         Yarn::Table(yarn) => of_yarn!(yarn, false),
-        Yarn::Signed(yarn) if f.shear.slider.is_some() || f.crush.is_some() => {
+        Yarn::Signed(yarn)
+            if f.shear.slider.is_some() || f.crush.is_some() || f.crossing.is_some() =>
+        {
             of_yarn!(&**yarn, true);
         }
         Yarn::Signed(yarn) => of_yarn!(&**yarn, false),

@@ -10,6 +10,7 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod built_in;
+mod coupling;
 pub mod fabric;
 pub mod fabric_linear;
 mod functions;

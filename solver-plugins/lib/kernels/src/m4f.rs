@@ -10,6 +10,7 @@
 //! otherwise: a coarse spar of plies at +-45 deg sheared by -8 deg where [`crate::m4`] gives -22 deg. So a material as stiff along its fibres as a
 //! fabric is refused unless the fibres run along the sides. The element is for films, and for telling hourglass control from material.
 
+use crate::coupling;
 use crate::quad::{
     FIELDS, MAX_LANES, Scratch, View, fields_of, largest, material_call, material_frame,
     stiffness_at_rest,
@@ -57,6 +58,13 @@ impl Element for M4f {
                  elements lie along the fibres",
                 largest / shear
             ));
+        }
+        if largest > FABRIC * shear && coupling::softest(material).is_some() {
+            return Err(
+                "element 'm4f': given fibres_along_sides, but the families of this material do not cross at a right angle, so both cannot lie along \
+                 sides: use 'm4'"
+                    .into(),
+            );
         }
         Ok(Self)
     }

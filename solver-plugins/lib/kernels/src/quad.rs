@@ -10,6 +10,7 @@
 //! affine motion of a flat reference element (so the mode is measured from the reference shape and
 //! turns with the element), and the normal `n = g1 x g2 / |g1 x g2|`.
 
+use crate::coupling;
 use crate::{Lanes, WIDTH, dispatch};
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::{Vec3, cross, dot, sub};
@@ -61,7 +62,8 @@ pub struct Hourglass {
 }
 
 impl Hourglass {
-    /// `plane = factor * min(max(shear tangent at rest, floor), a quarter of the largest tangent)`,
+    /// `plane = factor * min(max(shear tangent at rest, floor), a quarter of the largest tangent)`, where the shear tangent is that of
+    /// [`stiffness_at_rest`],
     /// `normal = normal_factor * plane`.
     ///
     /// # Errors
@@ -85,7 +87,8 @@ impl Hourglass {
     }
 }
 
-/// Largest tangent and shear tangent (N/m) of a material in its undeformed state.
+/// Largest tangent (N/m) of a material in its undeformed state, and how soft it is: its shear tangent, or where shear and stretches
+/// hang together half of its softest one ([`crate::coupling`]).
 ///
 /// # Errors
 /// When the material fails or gives values that are not finite and positive.
@@ -112,7 +115,7 @@ pub fn stiffness_at_rest(material: &MaterialRef) -> Result<(f64, f64), String> {
              tangent {shear} N/m: expected code 0 and finite, positive tangents"
         ));
     }
-    Ok((largest, shear))
+    Ok((largest, coupling::softest(material).unwrap_or(shear)))
 }
 
 /// a / |a|, by division: [`plyflow_geometry::vec3::unit`] multiplies, which rounds differently.

@@ -26,6 +26,7 @@
 //! undeformed plane with a positive z component (or, in a vertical plane, y, else x): elements must
 //! be wound counter-clockwise about it.
 
+use crate::coupling;
 use crate::m4::Parameters;
 use crate::quad::{self, Hourglass, MAX_LANES, material_frame};
 use crate::{Lanes, WIDTH, dispatch, thickening};
@@ -47,7 +48,16 @@ const PATCH_FIELDS: usize = 4;
 /// The formulation for one material.
 pub struct Rf4 {
     hourglass: Hourglass,
+    section: Section,
+}
+
+/// How a section bends.
+#[derive(Clone, Copy)]
+struct Section {
     thickening: u32,
+    /// What the tangents of single curvatures are to be multiplied with to bound all of them together: 3 where a twist bends the families (a quadratic form
+    /// is at most as often its diagonal as it has variables), else 1.
+    coupling: f64,
 }
 
 impl Element for Rf4 {
@@ -57,7 +67,14 @@ impl Element for Rf4 {
         let p = Parameters::parse(parameters, "rf4")?;
         Ok(Self {
             hourglass: p.hourglass(material)?,
-            thickening: p.thickening,
+            section: Section {
+                thickening: p.thickening,
+                coupling: if coupling::twist_bends(material) {
+                    3.0
+                } else {
+                    1.0
+                },
+            },
         })
     }
 
@@ -103,16 +120,16 @@ impl Element for Rf4 {
             if bend(material, &mut history, n, 0.0, &mut s, true) != PF_OK {
                 s.tangent.fill(f64::INFINITY);
             }
-            row_sums(&batch.constants, n, self.thickening, &s, stiffness);
+            row_sums(&batch.constants, n, self.section, &s, stiffness);
         }
     }
 
     fn patch_forces(&self, batch: &mut PatchBatch<'_>, material: &MaterialRef) -> i32 {
-        let power = self.thickening;
+        let section = self.section;
         match batch.lanes {
-            0..=16 => forces_with(batch, material, power, Scratch::<16>::new().view()),
-            17..=32 => forces_with(batch, material, power, Scratch::<32>::new().view()),
-            _ => forces_with(batch, material, power, Scratch::<MAX_LANES>::new().view()),
+            0..=16 => forces_with(batch, material, section, Scratch::<16>::new().view()),
+            17..=32 => forces_with(batch, material, section, Scratch::<32>::new().view()),
+            _ => forces_with(batch, material, section, Scratch::<MAX_LANES>::new().view()),
         }
     }
 }
@@ -120,10 +137,10 @@ impl Element for Rf4 {
 fn forces_with(
     batch: &mut PatchBatch<'_>,
     material: &MaterialRef,
-    power: u32,
+    section: Section,
     mut s: View<'_>,
 ) -> i32 {
-    let n = batch.lanes;
+    let (n, power) = (batch.lanes, section.thickening);
     derivatives(batch.position, &batch.constants, n, &mut s);
     let wanted = batch.stiffness.is_some();
     let code = bend(material, batch.history, n, batch.dt, &mut s, wanted);
@@ -135,7 +152,7 @@ fn forces_with(
     }
     forces(&batch.constants, n, power, &s, batch.force, batch.energy);
     if let Some(stiffness) = batch.stiffness.as_deref_mut() {
-        row_sums(&batch.constants, n, power, &s, stiffness);
+        row_sums(&batch.constants, n, section, &s, stiffness);
     }
     if let Some(fields) = batch.fields.as_deref_mut() {
         for l in 0..n {
@@ -463,8 +480,8 @@ fn forces_kernel<V: Lanes>(
 /// derivative of the energy: the tangent part `dM/dk dk dk` with each derivative as it is, and the
 /// geometric part `M d2k` by norms. A section that thickens has `p^2 W dlnJ dlnJ - p W d2lnJ - 2 p M dk dlnJ` besides;
 /// a block of `d2lnJ` is at most twice the product of its nodes' `|dlnJ|`.
-fn row_sums(constants: &[f64], n: usize, power: u32, s: &View<'_>, stiffness: &mut [f64]) {
-    let power = f64::from(power);
+fn row_sums(constants: &[f64], n: usize, section: Section, s: &View<'_>, stiffness: &mut [f64]) {
+    let power = f64::from(section.thickening);
     for l in 0..n {
         let area = constants[l];
         let count = (constants[n + l] as usize).clamp(1, PATCH_NODES);
@@ -487,7 +504,7 @@ fn row_sums(constants: &[f64], n: usize, power: u32, s: &View<'_>, stiffness: &m
         let mut rows = [0.0; PATCH_NODES];
         for a in 0..3 {
             let twice = if a == 2 { 2.0 } else { 1.0 };
-            let tangent = twice * s.tangent[a * n + l].abs() * area;
+            let tangent = section.coupling * twice * s.tangent[a * n + l].abs() * area;
             let moment = twice * s.moment[a * n + l].abs() * area;
             let tilt = dual.map(|d| dot(second[a], d));
             let derivative = |x: &[f64; TERMS]| x[2 + a] - tilt[0] * x[0] - tilt[1] * x[1];

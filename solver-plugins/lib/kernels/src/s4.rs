@@ -71,6 +71,7 @@ mod section;
 
 pub use section::S4;
 
+use crate::coupling;
 use crate::quad::{self, Hourglass, MAX_LANES, material_frame};
 use crate::thickening;
 use plyflow_geometry::Vec3;
@@ -97,6 +98,13 @@ impl Element for S4 {
                 "bending: lagged-tangent adds moments family by family, but the curvature of one \
                  family gives the other a moment in this material: set 'bending: total' (and, for \
                  an isotropic plate, 'twist: material')"
+                    .into(),
+            );
+        }
+        if p.twist == Twist::Layers && coupling::softest(material).is_some() {
+            return Err(
+                "twist: layers gives the ply its twist by the shear of two outer layers, but shear stretches fibres in this material, whose families \
+                 do not cross at a right angle, so that layers would bend as a solid plate: set 'twist: material'"
                     .into(),
             );
         }

@@ -25,6 +25,7 @@ pub mod archive;
 pub mod backend;
 pub mod component;
 pub mod contact;
+pub mod crossed;
 pub mod energy;
 pub mod history;
 pub mod mesh;

@@ -106,6 +106,24 @@ fn a_tool_drawn_elsewhere_is_placed_and_what_a_study_names_is_copied_into_it() {
 }
 
 #[test]
+fn the_second_fibres_lie_as_the_material_says() {
+    with_files(|root| {
+        let text = "plyflow_material: 1\nname: cloth\nthickness: 0.3 mm\nareal_mass: 210 g/m2\n";
+        for (with, second) in [
+            ("with: {fibre_modulus: 3 GPa, crossing: 60 deg}\n", "105"),
+            ("with:\n  crossing: 1 rad  # measured\n", "102.29578"),
+            ("# crossing: 60 deg\nwith: {}\n", "135"),
+        ] {
+            std::fs::write(root.join("cloth.yaml"), format!("{text}{with}")).unwrap();
+            let (files, _) = files(&args(root), &root.join("new/part"), None).unwrap();
+            let says = format!("fibre_1: 45 deg\n    fibre_2: {second} deg");
+            let scene = file(&files, "scene.yaml");
+            assert!(scene.contains(&says), "{says}\n{scene}");
+        }
+    });
+}
+
+#[test]
 fn under_a_single_film_plies_lie_on_the_tool() {
     with_files(|root| {
         let mut args = args(root);

@@ -24,6 +24,8 @@ pub struct Study {
     pub material: String,
     /// Thickness (m) of the thickest and areal mass (kg/m2) of the lightest material, where they are known.
     pub sheet: [Option<f64>; 2],
+    /// Angle from the first fibres of that material to its second ones (deg).
+    pub crossing: f64,
     /// Direction of each ply's first fibres (deg), where they are of no book.
     pub angles: Vec<f64>,
     /// How it is formed.
@@ -114,7 +116,7 @@ impl Study {
                 "  - name: ply_{}\n    kind: ply\n    material: {}\n    {size}\n    fibre_1: {angle} deg\n    fibre_2: {} deg\n",
                 k + 1,
                 quoted(&self.material),
-                angle + 90.0
+                angle + self.crossing
             );
         }
         text

@@ -8,6 +8,7 @@
 //! while the ply shears, so the law does not depend on the shear angle. The metric has no influence,
 //! which keeps the bending force the exact gradient of this energy.
 
+use super::crossing::Crossing;
 use super::cubic::Cubic;
 use super::hysteresis::{HISTORY, Slider};
 use crate::{Lanes, WIDTH, dispatch, exp};
@@ -49,8 +50,10 @@ pub(super) struct Bending {
     pub laws: Laws,
     /// For each family: +1 when a positive curvature bends it positively.
     pub signs: [f64; 2],
-    /// dM12/dk12 (N m).
+    /// dM12/dk12 (N m); of families that do not cross at a right angle that of one along the other.
     pub twist: f64,
+    /// Where they do not.
+    pub crossing: Option<Crossing>,
     /// Friction of the yarns of each family; `None`: neither has any.
     pub sliders: Option<[Option<Slider>; 2]>,
 }
@@ -74,6 +77,7 @@ pub(super) struct Rubbed<'a> {
 
 dispatch!(pub(super) fn rub(
     sliders: &[Option<Slider>; 2],
+    crossing: Option<&Crossing>,
     n: usize,
     curvature: &[f64],
     of: Rubbed<'_>,
@@ -83,6 +87,7 @@ dispatch!(pub(super) fn rub(
 #[inline(always)]
 fn rub_kernel<V: Lanes>(
     sliders: &[Option<Slider>; 2],
+    crossing: Option<&Crossing>,
     n: usize,
     curvature: &[f64],
     of: Rubbed<'_>,
@@ -93,27 +98,43 @@ fn rub_kernel<V: Lanes>(
             continue;
         };
         for c in (0..n).step_by(WIDTH) {
-            let at = family * n + c;
             let row = |r: usize| (family * HISTORY + r) * n + c;
             let stands = V::load(of.history, row(0));
-            let slid = slider.at(
-                V::load(curvature, at),
-                zero,
-                stands,
-                V::load(of.history, row(1)),
-            );
+            let own = match crossing {
+                Some(x) => x.curvature([0, 1, 2].map(|r| V::load(curvature, r * n + c)))[family],
+                None => V::load(curvature, family * n + c),
+            };
+            let slid = slider.at(own, zero, stands, V::load(of.history, row(1)));
             slid.stands.store(of.history, row(0));
             slid.lost.store(of.history, row(1));
-            (V::load(of.moment, at) + slid.force).store(of.moment, at);
             (V::load(of.energy, c) + slid.energy).store(of.energy, c);
-            if !of.tangent.is_empty() {
-                // Where it slides the moment does not grow any more.
-                let held = V::select(
-                    slid.force.abs().lt(V::splat(slider.limit)),
-                    V::splat(slider.stiffness),
-                    zero,
-                );
-                (V::load(of.tangent, at) + held).store(of.tangent, at);
+            // Where it slides the moment does not grow any more.
+            let sticks = slid.force.abs().lt(V::splat(slider.limit));
+            let held = V::select(sticks, V::splat(slider.stiffness), zero);
+            let alone = |value: V| {
+                let mut of_all = [zero; 3];
+                of_all[family] = value;
+                of_all
+            };
+            let add = |to: &mut [f64], r: usize, value: V| {
+                (V::load(to, r * n + c) + value).store(to, r * n + c);
+            };
+            match crossing {
+                Some(x) => {
+                    let (moment, tangent) = (x.moment(alone(slid.force)), x.diagonal(alone(held)));
+                    for r in 0..3 {
+                        add(of.moment, r, moment[r]);
+                        if !of.tangent.is_empty() {
+                            add(of.tangent, r, tangent[r]);
+                        }
+                    }
+                }
+                None => {
+                    add(of.moment, family, slid.force);
+                    if !of.tangent.is_empty() {
+                        add(of.tangent, family, held);
+                    }
+                }
             }
         }
     }
@@ -137,25 +158,21 @@ fn moments_kernel<V: Lanes>(
     energy: &mut [f64],
     tangent: &mut [f64],
 ) {
+    // Compiled for each kind of law, and for families that cross at a right angle and at another one.
+    macro_rules! of_laws {
+        ($family:expr) => {{
+            let family = $family;
+            match &law.crossing {
+                None => moments_of::<V>(law, family, n, curvature, moment, energy, tangent),
+                Some(x) => {
+                    crossed_moments_of::<V>(law, x, family, n, curvature, moment, energy, tangent);
+                }
+            }
+        }};
+    }
     match &law.laws {
-        Laws::Voce(laws) => moments_of::<V>(
-            law,
-            |family, k| voce(&laws[family], law.signs[family], k),
-            n,
-            curvature,
-            moment,
-            energy,
-            tangent,
-        ),
-        Laws::Any(laws) => moments_of::<V>(
-            law,
-            |family, k| any(&laws[family], law.signs[family], k),
-            n,
-            curvature,
-            moment,
-            energy,
-            tangent,
-        ),
+        Laws::Voce(laws) => of_laws!(|family, k| voce(&laws[family], law.signs[family], k)),
+        Laws::Any(laws) => of_laws!(|family, k| any(&laws[family], law.signs[family], k)),
     }
 }
 
@@ -186,6 +203,36 @@ fn moments_of<V: Lanes>(
         w.store(energy, c);
         if !tangent.is_empty() {
             twist.store(tangent, 2 * n + c);
+        }
+    }
+}
+
+/// The same of families that do not cross at a right angle.
+#[inline(always)]
+fn crossed_moments_of<V: Lanes>(
+    law: &Bending,
+    crossing: &Crossing,
+    family_law: impl Fn(usize, V) -> (V, V, V),
+    n: usize,
+    curvature: &[f64],
+    moment: &mut [f64],
+    energy: &mut [f64],
+    tangent: &mut [f64],
+) {
+    let twist = V::splat(law.twist);
+    for c in (0..n).step_by(WIDTH) {
+        let [k1, k2, k12] = crossing.curvature([0, 1, 2].map(|r| V::load(curvature, r * n + c)));
+        let ((m1, w1, t1), (m2, w2, t2)) = (family_law(0, k1), family_law(1, k2));
+        (w1 + w2 + twist * k12 * k12).store(energy, c);
+        let moments = crossing.moment([m1, m2, twist * k12]);
+        for (r, value) in moments.into_iter().enumerate() {
+            value.store(moment, r * n + c);
+        }
+        if !tangent.is_empty() {
+            let tangents = crossing.diagonal([t1, t2, twist]);
+            for (r, value) in tangents.into_iter().enumerate() {
+                value.store(tangent, r * n + c);
+            }
         }
     }
 }

@@ -51,6 +51,21 @@ pub(super) fn slips(name: &str, angle_given: f64) -> Result<(), String> {
     ))
 }
 
+/// Least angle between the families (20 deg), and 180 deg less it the largest: nearer to each other no shear is left before they meet.
+const LEAST_CROSSING: f64 = 20.0 * std::f64::consts::PI / 180.0;
+
+/// The angle between the families before forming.
+pub(super) fn crossing(name: &str, given: f64) -> Result<(), String> {
+    let apart = given.min(std::f64::consts::PI - given);
+    if apart >= 0.999_999 * LEAST_CROSSING {
+        return Ok(());
+    }
+    Err(format!(
+        "{name}: given {}; expected 20 to 160 deg, counter-clockwise from family 1 to family 2",
+        angle(given)
+    ))
+}
+
 /// What a table holds, for messages.
 pub(super) struct Columns {
     pub at: &'static str,

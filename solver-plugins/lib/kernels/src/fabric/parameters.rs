@@ -3,6 +3,7 @@
 use super::bending::{Bending, Law, Laws, Voce};
 use super::checks::{self, not_negative, positive};
 use super::compression::Crush;
+use super::crossing::Crossing;
 use super::cubic::Cubic;
 use super::hysteresis::Slider;
 use super::ply::{Fabric, Form};
@@ -17,6 +18,7 @@ use serde::Deserialize;
 pub(super) struct Parameters {
     #[serde(default = "fibre_energy")]
     form: Form,
+    crossing: Option<f64>,
     fibre_modulus: f64,
     fibre_modulus_2: Option<f64>,
     compression_factor: Option<f64>,
@@ -175,10 +177,11 @@ impl Parameters {
         positive("areal_mass", self.areal_mass, "kg/m2")?;
         let h = self.thickness;
         let pushed = self.pushed(moduli)?;
-        let shear = self.shear.build(self.stitch, pushed.crush.is_some())?;
-        let bending = self
-            .bending
-            .map(|b| b.build(shear.initial_slope() * h * h / 6.0));
+        let crossing = self.crossing()?;
+        let signed = pushed.crush.is_some() || crossing.is_some();
+        let shear = self.shear.build(self.stitch, signed)?;
+        let twist = shear.initial_slope() * h * h / 6.0;
+        let bending = self.bending.map(|b| b.build(twist, crossing));
         let tension = moduli.map(|modulus| modulus * h);
         Ok(Fabric {
             form: self.form,
@@ -191,6 +194,7 @@ impl Parameters {
                 })
             }),
             crush: pushed.crush,
+            crossing,
             shear,
             bending: bending.transpose()?,
             thickness: h,
@@ -206,6 +210,19 @@ struct Pushed {
 }
 
 impl Parameters {
+    /// How the families cross; none where they do at a right angle.
+    fn crossing(&self) -> Result<Option<Crossing>, String> {
+        let Some(angle) = self.crossing else {
+            return Ok(None);
+        };
+        checks::crossing("crossing", angle)?;
+        let crossing = Crossing::new(angle);
+        if crossing.is_some() && self.form == Form::Hypoelastic {
+            return Err("crossing: given with form 'hypoelastic', whose two frames lie along families at a right angle; expected form 'fibre-energy'".into());
+        }
+        Ok(crossing)
+    }
+
     /// Whether what is said of compression goes together.
     fn check_compression(&self) -> Result<(), String> {
         let curves = [&self.compression, &self.compression_2];
@@ -376,8 +393,8 @@ fn branch(
 }
 
 impl BendingParameters {
-    /// `twist`: dM12/dk12 when none is given.
-    fn build(self, twist: f64) -> Result<Bending, String> {
+    /// `twist`: dM12/dk12 when none is given. `crossing`: how the families cross, where it is not at a right angle.
+    fn build(self, twist: f64, crossing: Option<Crossing>) -> Result<Bending, String> {
         let slider =
             |path: &str, h: Option<BendingHysteresis>| h.map(|h| h.build(path)).transpose();
         let mut sliders = [slider("bending", self.hysteresis)?; 2];
@@ -434,6 +451,7 @@ impl BendingParameters {
             laws: Laws::from(laws),
             signs: [first, second],
             twist,
+            crossing,
             sliders: sliders.iter().any(Option::is_some).then_some(sliders),
         })
     }

@@ -2,6 +2,7 @@
 
 use super::bending::Bending;
 use super::compression::Crush;
+use super::crossing::Crossing;
 use super::shear::Shear;
 use crate::Lanes;
 
@@ -25,6 +26,8 @@ pub struct Fabric {
     pub(super) crush: Option<[Crush; 2]>,
     /// Largest fibre stiffness of each family, at any stretch (N/m).
     pub(super) stiffest: [f64; 2],
+    /// Where the families do not cross at a right angle.
+    pub(super) crossing: Option<Crossing>,
     pub(super) shear: Shear,
     pub(super) bending: Option<Bending>,
     pub(super) thickness: f64,

@@ -160,7 +160,13 @@ pub(super) fn at_rest(s4: &S4, constants: &[f64], n: usize, l: usize, x: &[Vec3;
     let lane = Lane::new(constants, n, l);
     let along = [mix(1.0, x[1], -1.0, x[0]), mix(1.0, x[2], -1.0, x[3])];
     let across = [mix(1.0, x[3], -1.0, x[0]), mix(1.0, x[2], -1.0, x[1])];
-    let bending = s4.rest.stiffness * if s4.rest.coupled { 2.0 } else { 1.0 };
+    let together = if s4.rest.coupled { 2.0 } else { 1.0 };
+    let twisted = if s4.rest.twist_bends {
+        s4.rest.twist
+    } else {
+        0.0
+    };
+    let bending = s4.rest.stiffness * together + twisted;
     // The layers' twist is 4 w z^2 G = 0.15 h^2 G, far below the bending; the step's bound has it.
     let twist = if s4.layers.is_some() {
         0.0
@@ -293,7 +299,10 @@ impl State {
             layered = 2.0 * w.height * w.height * outer(1);
         }
         let t: Vec3 = at(s.tangent, 0);
-        let family = if s4.rest.coupled {
+        // The trace of all that hang together.
+        let family = if s4.rest.twist_bends {
+            t[0] + t[1] + t[2]
+        } else if s4.rest.coupled {
             t[0] + t[1]
         } else {
             t[0].max(t[1])

@@ -1,6 +1,7 @@
 //! What an element of `s4` is made of: its parameters, its layers, its material at rest, and the rows of its constants and history.
 
 use super::lag;
+use crate::coupling;
 use crate::quad::{Hourglass, Rows};
 use crate::{WIDTH, thickening};
 use plyflow_sdk::abi::PF_OK;
@@ -123,6 +124,8 @@ pub(super) struct Rest {
     pub(super) twist: f64,
     /// Whether one family's curvature gives the other a moment.
     pub(super) coupled: bool,
+    /// Whether a twist bends the families.
+    pub(super) twist_bends: bool,
 }
 
 impl Rest {
@@ -175,6 +178,7 @@ impl Rest {
             stiffness,
             twist,
             coupled: cross > 1e-6 * m[0].abs().max(m[WIDTH + 2].abs()),
+            twist_bends: coupling::twist_bends(material),
         })
     }
 }

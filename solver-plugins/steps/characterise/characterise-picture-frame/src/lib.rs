@@ -61,6 +61,7 @@ impl Step for CharacterisePictureFrame {
     fn run(host: &Host) -> Result<(), StepError> {
         let p: Parameters = host.parameters()?;
         let template = Template::of(host, p.template.as_deref())?;
+        template.as_ref().map_or(Ok(()), square)?;
         if p.positive.is_empty() {
             return Err("`positive` is empty; give at least one CSV file of a test".into());
         }
@@ -326,6 +327,19 @@ fn write_fit(out: &mut Output, shear: &Shear, both: bool, mut series: Vec<Series
     }
     let axes = [("shear angle", "deg"), ("normalised shear force", "N/m")];
     out.plot("shear", "Normalised shear force", axes[0], axes[1], series);
+}
+
+/// Whether a template's families lie along the arms of a frame, which begins as a square.
+fn square(template: &Template) -> Result<(), StepError> {
+    match template.parameter(&["crossing"]) {
+        Some(angle) => Err(format!(
+            "template: its families cross at `crossing: {}`, and a picture frame begins as a square with the fibres along its arms; expected a template without \
+             `crossing`: shear counts from the angle at which the test began",
+            angle.as_str().map_or_else(|| angle.to_string(), str::to_owned)
+        )
+        .into()),
+        None => Ok(()),
+    }
 }
 
 /// Says what becomes of the template's law for negative shear, where that may not be what is meant. `turned`: its stitch is stretched there.

@@ -181,6 +181,29 @@ fn a_fabric_fitted_without_a_stitch_loses_that_of_the_template() {
 }
 
 #[test]
+fn a_template_whose_families_cross_askew_is_no_fabric_of_a_square_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    let up = csv(folder.path(), "up.csv", woven_shear, 1.0, 60.0);
+    let mut parameters = with(&[up], &[], false, "unidirectional");
+    let text = std::fs::read_to_string(parameters["template"].as_str().unwrap()).unwrap();
+    let template = folder.path().join("askew.yaml");
+    std::fs::write(
+        &template,
+        text.replace("with:\n", "with:\n  crossing: 60 deg\n"),
+    )
+    .unwrap();
+    parameters["template"] = json!(template);
+    let told = run::<CharacterisePictureFrame>(parameters, &[], &[])
+        .err()
+        .unwrap()
+        .to_string();
+    assert!(
+        told.contains("crossing: 60 deg") && told.contains("begins as a square"),
+        "{told}"
+    );
+}
+
+#[test]
 fn the_least_template_of_the_guide_becomes_a_fabric_with_the_fitted_shear() {
     let guide = concat!(
         env!("CARGO_MANIFEST_DIR"),

@@ -5,6 +5,7 @@ use crate::laws::PlyLaw;
 use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{Forming, Sheet};
 use plyflow_model::scene::{Scene, first_axis};
+use plyflow_model::steering::Laid;
 use plyflow_sdk::{Host, Input, StepError};
 use plyflow_surface::Topology;
 
@@ -38,7 +39,9 @@ impl Known {
         let has = |name: &str| body.fields.iter().any(|f| f.name == name);
         let all = FORCES.iter().chain([&PRESSURE]);
         let missing: Vec<&str> = all.copied().filter(|f| !has(f)).collect();
-        let straight = sheet.laid().and_then(|l| l.straight());
+        let laid = sheet.laid();
+        let askew = laid.as_ref().and_then(Laid::crossing);
+        let straight = laid.filter(|_| askew.is_none()).and_then(|l| l.straight());
         let axis = straight.filter(|_| missing.is_empty());
         let axis = axis.map(|[first, second]| first_axis(first, second));
         let axis = axis.ok_or_else(|| {
@@ -47,6 +50,13 @@ impl Known {
                     return format!(
                         "scene: given, so compressed fibres are to be judged, but the fibres of ply '{}' of '{}' are steered, and a ruck is looked for \
                          along straight fibres alone; leave out `scene`",
+                        sheet.name, input.step
+                    );
+                }
+                [] if askew.is_some() => {
+                    return format!(
+                        "scene: given, so compressed fibres are to be judged, but the fibre families of ply '{}' of '{}' do not cross at a right angle, and a \
+                         ruck is looked for along families that do; leave out `scene`",
                         sheet.name, input.step
                     );
                 }

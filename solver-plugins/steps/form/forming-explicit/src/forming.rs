@@ -75,6 +75,17 @@ impl Forming {
 
     /// Values of a field of a body's elements, which have the fields `all`. Needs a step with fields.
     pub fn field(&self, body: &Body, f: &ElementField, all: &[ElementField]) -> Vec<f64> {
+        let own =
+            |name: &str| Some(self.own_field(body, all.iter().find(|f| f.name == name)?, all));
+        let mut sheets = self.bodies.iter().zip(&self.stack);
+        let sheet = sheets.find(|(b, _)| b.name == body.name);
+        let crossed = sheet.and_then(|(_, sheet)| sheet.crossed());
+        let of_families = crossed.and_then(|crossed| crossed.field(&f.name, own));
+        of_families.unwrap_or_else(|| self.own_field(body, f, all))
+    }
+
+    /// The same as the elements tell it.
+    fn own_field(&self, body: &Body, f: &ElementField, all: &[ElementField]) -> Vec<f64> {
         let of = |f: &ElementField| {
             if f.patch {
                 self.model.patch_field(body.sheet.0, f.row)

@@ -59,8 +59,11 @@ pub(super) struct Law {
     strain: f64,
 }
 
+/// A law whose families do not lie along the material's axes.
+pub(super) const CROSSED: &str = "fabric, families at 60 deg";
+
 /// Stitched fabric FCIM359, woven fabric 38616, film HT-350 (thesis tables 3.1, 3.2, 5.1), and plain sheets.
-pub(super) const LAWS: [Law; 6] = [
+pub(super) const LAWS: [Law; 7] = [
     Law {
         name: "fabric, fibre-energy",
         plugin: "material-fabric",
@@ -90,6 +93,17 @@ pub(super) const LAWS: [Law; 6] = [
             "shear":{"coefficients":[0,37.35,-322.61,1458.51,-3539.56,4727.84,-3275.20,930.53]},
             "bending":{"positive":{"linear":1.549e-5,"asymptote":0.00757,"scale":20.0}},
             "thickness":3e-4,"areal_mass":0.21}"#,
+        strain: 0.03,
+    },
+    Law {
+        name: CROSSED,
+        plugin: "material-fabric",
+        parameters: r#"{"fibre_modulus":3e9,"fibre_modulus_2":1e9,"compression_factor":0.3,"crossing":1.0471975511965976,
+            "shear":{"coefficients":[0,112.19,94.73,137.06,-65.56,29.56],"limit":1.0471975511965976},
+            "stitch":{"angles":[0.06,0.5,0.75],"forces":[0,880,0]},
+            "bending":{"family_1":{"positive":{"linear":1.9457e-4,"asymptote":0.03139,"scale":4.0}},
+                       "family_2":{"positive":{"linear":1.0279e-4,"asymptote":0.03619,"scale":6.5}}},
+            "thickness":4e-4,"areal_mass":0.44}"#,
         strain: 0.03,
     },
     Law {
@@ -389,7 +403,7 @@ fn sheet(kit: &Kit, r: &mut Random, mesh: &QuadMesh, direction: f64, range: Rang
     if ["rf4", "s4"].contains(&kit.name) && r.happens(0.25) {
         parameters["thickening"] = r.one_of(&[1, 2]).into();
     }
-    if kit.name == "s4" && r.happens(0.25) {
+    if kit.name == "s4" && (r.happens(0.25) || kit.law.name == CROSSED) {
         parameters["twist"] = "material".into();
     }
     let sizes = [0, 1].map(|_| r.scale(0.3, 3.0));

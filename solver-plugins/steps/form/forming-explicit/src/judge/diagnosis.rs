@@ -223,7 +223,8 @@ fn weakest(forming: &Forming) -> Option<Weakest> {
     let nodes = m.cells()[cell];
     let of = |points: &[Vec3]| nodes.map(|n| points[n as usize]);
     let then = of(&forming.reference);
-    let (shear, strain) = cell_strain(then, of(m.x()), sheet.axis_in_cell(&then));
+    let axis = sheet.axis_in_cell(&then);
+    let (shear, strain) = cell_strain(then, of(m.x()), axis, sheet.crossed());
     Some(Weakest {
         shear,
         is_film: !sheet.is_ply(),

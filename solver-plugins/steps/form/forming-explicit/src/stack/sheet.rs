@@ -4,6 +4,7 @@ use crate::error::{FormingError, Result};
 use plyflow_blank::Blank;
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::Vec3;
+use plyflow_mechanics::crossed::Crossed;
 use plyflow_mechanics::mirror::Planes;
 use plyflow_mechanics::sheet::SteeredAxes;
 use plyflow_model::material::{Material, MaterialEntry};
@@ -29,6 +30,11 @@ impl StackSheet {
     /// Whether it is a ply, not a film.
     pub fn is_ply(&self) -> bool {
         self.scene.kind == SheetKind::Ply
+    }
+
+    /// How its families cross, where they do not at a right angle.
+    pub fn crossed(&self) -> Option<Crossed> {
+        self.laid.crossing().map(Crossed::new)
     }
 
     /// Direction of material axis e1 at a place of the undeformed plane (m).
@@ -64,13 +70,13 @@ pub fn stack(scene: &Scene) -> Result<Vec<StackSheet>> {
         .sheets
         .iter()
         .map(|sheet| {
-            check_sheet(sheet)?;
             let MaterialEntry::Inline(material) = &sheet.material else {
                 return Err(FormingError::Scene(format!(
                     "the material of sheet '{}' was not read in",
                     sheet.name
                 )));
             };
+            check_sheet(sheet, material)?;
             let laid = sheet.laid().map_err(|e| {
                 FormingError::Scene(format!("fibre_1 of sheet '{}': {e}", sheet.name))
             })?;
@@ -96,25 +102,40 @@ pub fn lay(stack: &mut [StackSheet]) {
     }
 }
 
-/// How far (rad) the angle between the fibre families may be from a right one: rounding of angles that are written in degrees.
-const SQUARE: f64 = 1e-6;
-
-/// Whether the solver can compute a sheet as the scene has it.
-fn check_sheet(sheet: &Sheet) -> Result<()> {
-    if let (SheetKind::Ply, Some([first, second])) = (sheet.kind, sheet.fibres()) {
-        let degrees = |angle: f64| (1e6 * angle.to_degrees()).round() / 1e6;
-        let between = second - first;
-        if between.fixed_cos().abs() > SQUARE {
-            return Err(FormingError::Scene(format!(
-                "ply '{}': given fibres at {} and {} deg; expected families that cross at a right angle before forming, such as -45 and 45 deg: \
-                 elements and material laws of forming-explicit measure shear from there. (forming-kinematic drapes other angles too)",
-                sheet.name,
-                degrees(first),
-                degrees(second)
-            )));
+/// Whether the solver can compute a sheet as the scene has it: its families cross as its material's law has them.
+fn check_sheet(sheet: &Sheet, material: &Material) -> Result<()> {
+    let degrees = |angle: f64| (1e6 * angle.to_degrees()).round() / 1e6;
+    let told = material.crossing();
+    match (sheet.kind, sheet.fibres()) {
+        (SheetKind::Ply, Some([first, second])) => {
+            let crossing = Laid::Straight([first, second]).crossing();
+            match crossing {
+                // Where the material tells the angle, the rules of scenes hold both against each other.
+                Some(crossing) if told.is_none() => Err(FormingError::Scene(format!(
+                    "ply '{}': given fibres at {} and {} deg; expected families that cross at a right angle before forming, such as -45 and 45 deg, or a \
+                     material whose law knows at which angle they cross: of a `material-fabric`, `with: {{crossing: {} deg}}`. (forming-kinematic drapes \
+                     any angles)",
+                    sheet.name,
+                    degrees(first),
+                    degrees(second),
+                    degrees(crossing)
+                ))),
+                _ => Ok(()),
+            }
         }
+        (SheetKind::Ply, None)
+            if told.is_some_and(|t| Laid::Straight([0.0, t]).crossing().is_some()) =>
+        {
+            Err(FormingError::Scene(format!(
+                "ply '{}': given steered fibres, and a material (`{}`) whose families cross at {} deg; expected one whose families cross at a right angle: \
+                 the second family of a steered ply lies square to the first one at each place",
+                sheet.name,
+                material.name,
+                degrees(told.unwrap_or_default())
+            )))
+        }
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 /// The blank of a ply before forming.

@@ -4,6 +4,7 @@
 mod common;
 
 mod absurd;
+mod crossing;
 mod friction;
 mod hard_cases;
 mod load_path;
