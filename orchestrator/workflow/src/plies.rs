@@ -56,11 +56,15 @@ struct Entered<'n> {
     base: usize,
 }
 
-/// Puts what files say into a scene; `None` where it names none of them.
-pub(crate) fn fill(scene: &Node, source: &Source, problems: &mut Problems) -> Option<Filled> {
+/// Puts what files say into a scene; one that names none of them stays as it is.
+pub(crate) fn fill(scene: &Node, source: &Source, problems: &mut Problems) -> Filled {
     let sheets = scene.get("sheets").map_or(&[][..], Node::items);
     if !sheets.iter().any(names_files) {
-        return None;
+        return Filled {
+            scene: scene.clone(),
+            source: source.clone(),
+            sound: true,
+        };
     }
     let mut filler = Filler {
         problems,
@@ -85,11 +89,11 @@ pub(crate) fn fill(scene: &Node, source: &Source, problems: &mut Problems) -> Op
     if let Some(entry) = entry_mut(&mut scene, "sheets") {
         entry.value.kind = Kind::List(filled);
     }
-    Some(Filled {
+    Filled {
         scene,
         source: filler.source,
         sound: filler.sound,
-    })
+    }
 }
 
 fn names_files(sheet: &Node) -> bool {

@@ -186,11 +186,7 @@ pub fn scene_value(
         return None;
     }
     Checker::new(&SCENE, at.source, resolver.problems).check(node, "the scene");
-    let filled = plies::fill(node, at.source, resolver.problems).unwrap_or_else(|| plies::Filled {
-        scene: node.clone(),
-        source: at.source.clone(),
-        sound: true,
-    });
+    let filled = plies::fill(node, at.source, resolver.problems);
     let (mut node, source) = (filled.scene, filled.source);
     let at = &Place {
         source: &source,

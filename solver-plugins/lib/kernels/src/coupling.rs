@@ -3,7 +3,7 @@
 //! alone are no bound of its bending stiffness.
 
 use crate::WIDTH;
-use crate::quad::Rows;
+use crate::rows::Rows;
 use plyflow_sdk::abi::PF_OK;
 use plyflow_sdk::{Aligned, BendingBatch, MaterialRef, MembraneBatch};
 

@@ -21,6 +21,7 @@ pub mod m4f;
 pub mod marlow;
 pub mod quad;
 pub mod rf4;
+pub mod rows;
 pub mod s4;
 mod strain;
 mod thickening;

@@ -11,6 +11,7 @@
 //! turns with the element), and the normal `n = g1 x g2 / |g1 x g2|`.
 
 use crate::coupling;
+use crate::rows::Rows;
 use crate::{Lanes, WIDTH, dispatch};
 use plyflow_fixed::FixedBits;
 use plyflow_geometry::vec3::{Vec3, cross, dot, sub};
@@ -37,18 +38,6 @@ pub(crate) fn sizes() -> ElementSizes {
         material_points: 1,
         fields: FIELDS,
         ..Default::default()
-    }
-}
-
-/// Stack rows, aligned as the ABI asks.
-#[repr(align(64))]
-pub struct Rows<const N: usize>(pub [f64; N]);
-
-impl<const N: usize> Rows<N> {
-    /// Zeros.
-    #[inline(always)]
-    pub fn zeros() -> Self {
-        Self([0.0; N])
     }
 }
 

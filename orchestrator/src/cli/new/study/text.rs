@@ -116,7 +116,7 @@ impl Study {
                 "  - name: ply_{}\n    kind: ply\n    material: {}\n    {size}\n    fibre_1: {angle} deg\n    fibre_2: {} deg\n",
                 k + 1,
                 quoted(&self.material),
-                angle + self.crossing
+                (1e6 * (angle + self.crossing)).round() / 1e6
             );
         }
         text

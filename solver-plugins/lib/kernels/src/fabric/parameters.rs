@@ -393,10 +393,18 @@ fn branch(
 }
 
 impl BendingParameters {
+    /// By family, +1 when a positive curvature bends it positively.
+    fn signs(&self) -> [f64; 2] {
+        let sign = |same: bool| if same { 1.0 } else { -1.0 };
+        let first = sign(self.positive_face == Face::Up);
+        [first, first * sign(self.families == Families::Same)]
+    }
+
     /// `twist`: dM12/dk12 when none is given. `crossing`: how the families cross, where it is not at a right angle.
     fn build(self, twist: f64, crossing: Option<Crossing>) -> Result<Bending, String> {
         let slider =
             |path: &str, h: Option<BendingHysteresis>| h.map(|h| h.build(path)).transpose();
+        let signs = self.signs();
         let mut sliders = [slider("bending", self.hysteresis)?; 2];
         let laws = match (self.positive, self.negative, self.family_1, self.family_2) {
             (Some(p), n, None, None) => {
@@ -437,19 +445,9 @@ impl BendingParameters {
         };
         let twist = self.twist_stiffness.unwrap_or(twist);
         not_negative("bending.twist_stiffness", twist, "N m")?;
-        let first = if self.positive_face == Face::Up {
-            1.0
-        } else {
-            -1.0
-        };
-        let second = if self.families == Families::Same {
-            first
-        } else {
-            -first
-        };
         Ok(Bending {
             laws: Laws::from(laws),
-            signs: [first, second],
+            signs,
             twist,
             crossing,
             sliders: sliders.iter().any(Option::is_some).then_some(sliders),

@@ -2,7 +2,8 @@
 
 use super::lag;
 use crate::coupling;
-use crate::quad::{Hourglass, Rows};
+use crate::quad::Hourglass;
+use crate::rows::Rows;
 use crate::{WIDTH, thickening};
 use plyflow_sdk::abi::PF_OK;
 use plyflow_sdk::{Aligned, BendingBatch, MaterialRef};
