@@ -169,6 +169,7 @@ fn agree(sheet: &Sheet, path: Path) -> Option<Fault> {
     })
 }
 
+/// Whether the families are two.
 fn cross(sheet: &Sheet, path: Path) -> Option<Fault> {
     let [first, second] = sheet.fibres()?;
     // A fibre has no sense: directions 180 deg apart are the same.

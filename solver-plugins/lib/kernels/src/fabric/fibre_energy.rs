@@ -10,7 +10,8 @@ use crate::{Lanes, WIDTH};
 pub(super) const HISTORY: usize = 2;
 
 /// Stresses and energies from the metric; the history is that of the stitch, `stiffness` may be empty. `MORE`: whether yarns may rub, fibres
-/// follow a curve in compression, or families cross at another angle than a right one, which is known when it is compiled, as the tests for it would cost the others a tenth of their time.
+/// follow a curve in compression, or families cross at another angle than a right one, which is known when it is compiled, as the tests for it would
+/// cost the others a tenth of their time.
 /// Long, as it is the loop of a kernel: pieces of it would share most of its values, and its speed would hang on how they are inlined.
 #[inline(always)]
 pub(super) fn membrane<V: Lanes, L: Law, const MORE: bool>(
