@@ -24,7 +24,7 @@ CHECKED := $(foreach crate,mechanics kernels,$(foreach look,debug-assertions=tru
 # With these two beside them the dependencies of the two have the features that the whole workspace gives them, and are not compiled once more.
 SAME_FEATURES := -p plyflow -p plyflow-python-law
 
-.PHONY: help build demo check test checked long fuzz hard-cases templates wheel lint bench book docs pictures clean
+.PHONY: help build demo check test checked long fuzz device hard-cases templates wheel lint bench book docs pictures clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | while IFS="$$(printf '\t')" read -r n t; do printf 'make %-10s %s\n' "$$n" "$$t"; done
@@ -52,6 +52,7 @@ check: ## form, lints and the tests that need no HDF5: under a minute once built
 test: ## run all tests, also with VTK's own reader, Chromium and a step in C
 	@scripts/setup tests
 	. ./.tools/env && scripts/run-tests $(CARGO_FLAGS) --workspace
+	scripts/check-inlined
 	scripts/check-vtk
 	scripts/check-report
 
@@ -67,6 +68,11 @@ long: ## run the tests that take many minutes
 
 fuzz: ## put readers of files under inputs that coverage leads; an hour, or make fuzz FUZZ_SECONDS=120
 	scripts/fuzz --seconds $(or $(FUZZ_SECONDS),3600)
+
+device: ## compile what a GPU computes, without a GPU: registers and spills of each function
+	@scripts/setup device
+	$(CARGO) build $(CARGO_FLAGS) -p plyflow-kernels --example device_sources
+	.tools/venv/bin/python scripts/check-device
 
 hard-cases: build ## run what is made to break elements, laws and contacts, and write docs/hard-cases.md
 	scripts/hard-cases

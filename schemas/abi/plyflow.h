@@ -1,4 +1,4 @@
-/* plyflow.h: the contract between the Plyflow host and a plugin. ABI 1.1.
+/* plyflow.h: the contract between the Plyflow host and a plugin. ABI 1.2.
  *
  * A plugin is a shared library that exports one symbol:
  *
@@ -25,9 +25,10 @@ extern "C" {
 #endif
 
 #define PF_ABI_MAJOR 1u
-/* 1: checkpoints, ignores_velocity. Made more exact before its release: units of what a step writes, `measured`, `size`
+/* 2: tapes.
+ * 1: checkpoints, ignores_velocity. Made more exact before its release: units of what a step writes, `measured`, `size`
  * of the structs of sizes, dt = 0, bounds of 0 in shear, no NULL instances. */
-#define PF_ABI_MINOR 1u
+#define PF_ABI_MINOR 2u
 #define PF_MAGIC 0x31574F4C46594C50ull /* the bytes "PLYFLOW1" in memory on a little-endian machine */
 #define PF_SYMBOL "plyflow_plugin"
 
@@ -212,6 +213,25 @@ typedef struct pf_error {
   char text[PF_ERROR_TEXT]; /* NUL-terminated UTF-8 */
 } pf_error;
 
+/* -- tapes (since ABI 1.2): what a component does to one lane, for devices that cannot call it --
+ *
+ * A tape is a text: the operations of one function, one a line, as docs/plugins/tape.md has them. A host may compile it for a device, where it takes the
+ * place of the function and must give the same bits; check-plugin holds both against each other. Buffers have the names of the fields of the batch
+ * (metric, history, dt, stress, ..); of a patch, as `count` nodes of it are in use, there is one tape for each count. An element asks its
+ * material by `call .. membrane` and `call .. bending`. Optional outputs: `stiffness` and `tangent` are wanted, `fields` and `critical_step` not.
+ *
+ * The text is written in pieces, in order. PF_OK: it is whole. PF_NOT_FOUND: the component has none for this function, and runs where it can be called.
+ * Anything else is a fault, with a text in `error`. */
+typedef struct pf_writer {
+  void *host;
+  void (*write)(void *host, pf_str piece);
+} pf_writer;
+
+#define PF_TAPE_MEMBRANE 1u
+#define PF_TAPE_BENDING 2u
+#define PF_TAPE_FORCES 3u
+#define PF_TAPE_PATCH_FORCES 4u
+
 /* -- material: the law of a sheet, in resultants (per undeformed area) --
  * Axes: e1, e2 are the orthonormal reference material axes in the undeformed plane; for a biaxial fabric
  * they are its two fibre directions, ordered so that positive shear stretches the stitch. */
@@ -262,6 +282,8 @@ typedef struct pf_material_functions {
   int32_t (*sizes)(const void *instance, pf_material_sizes *sizes);
   int32_t (*membrane)(const void *instance, const pf_membrane_batch *batch);
   int32_t (*bending)(const void *instance, const pf_bending_batch *batch); /* may be NULL when has_bending is 0 */
+  /* Since ABI 1.2; may be NULL. what: PF_TAPE_MEMBRANE or PF_TAPE_BENDING */
+  int32_t (*tape)(const void *instance, uint32_t what, const pf_writer *to, pf_error *error);
 } pf_material_functions;
 
 typedef struct pf_material {
@@ -351,6 +373,8 @@ typedef struct pf_element_functions {
   int32_t (*forces)(const void *instance, const pf_element_batch *batch);
   int32_t (*patch_initialise)(const void *instance, const pf_patch_batch *batch); /* it and the next may be NULL when patch_nodes is 0 */
   int32_t (*patch_forces)(const void *instance, const pf_patch_batch *batch);
+  /* Since ABI 1.2; may be NULL. what: PF_TAPE_FORCES, or PF_TAPE_PATCH_FORCES of a patch with `count` nodes in use */
+  int32_t (*tape)(const void *instance, uint32_t what, uint32_t count, const pf_writer *to, pf_error *error);
 } pf_element_functions;
 
 #ifdef __cplusplus

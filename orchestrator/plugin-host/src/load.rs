@@ -97,17 +97,23 @@ impl Plugin {
     }
 
     fn check(path: &Utf8Path, d: &'static pf_plugin) -> Result<Self, Breach> {
-        let (kind, least) = match d.kind {
-            PF_KIND_STEP => (PluginKind::Step, size_of::<pf_step_functions>()),
-            PF_KIND_ELEMENT => (PluginKind::Element, size_of::<pf_element_functions>()),
-            PF_KIND_MATERIAL => (PluginKind::Material, size_of::<pf_material_functions>()),
+        // The least size of a table is that of ABI 1.0. What has come since is at the end.
+        let step = size_of::<pf_step_functions>();
+        let (kind, least, whole) = match d.kind {
+            PF_KIND_STEP => (PluginKind::Step, step, step),
+            PF_KIND_ELEMENT => {
+                let whole = size_of::<pf_element_functions>();
+                (PluginKind::Element, pf_element_functions::LEAST, whole)
+            }
+            PF_KIND_MATERIAL => {
+                let whole = size_of::<pf_material_functions>();
+                (PluginKind::Material, pf_material_functions::LEAST, whole)
+            }
             other => return Err(Breach::Kind(other)),
         };
         if d.functions.is_null() {
             return Err(Breach::NullTable);
         }
-        // No table has grown since ABI 1.0, so today's size is the least one for a plugin of any minor. When one grows,
-        // the least size must be that of the plugin's own `abi_minor`: else every plugin built before is refused.
         // SAFETY: not NULL, so a table, and every table begins with its size.
         let size = unsafe { d.functions.cast::<u64>().read_unaligned() };
         if size < least as u64 {
@@ -127,7 +133,7 @@ impl Plugin {
             path: path.to_owned(),
             manifest,
             manifest_text: text,
-            functions: d.functions,
+            functions: widened(d.functions, size, whole),
         })
     }
 
@@ -136,6 +142,22 @@ impl Plugin {
     pub fn functions(&self) -> *const c_void {
         self.functions
     }
+}
+
+/// A table with all functions of today: those that one of an earlier minor version does not have are NULL.
+fn widened(functions: *const c_void, size: u64, whole: usize) -> *const c_void {
+    if size >= whole as u64 {
+        return functions;
+    }
+    // A size and pointers, of eight bytes each.
+    let table: &'static mut [u64] = vec![0; whole / size_of::<u64>()].leak();
+    // SAFETY: the plugin's table has `size` bytes, as it says, and the new one has more.
+    unsafe {
+        let from = functions.cast::<u8>();
+        from.copy_to_nonoverlapping(table.as_mut_ptr().cast(), size as usize);
+    }
+    table[0] = whole as u64;
+    table.as_ptr().cast()
 }
 
 /// BLAKE3 of a file, hex.

@@ -1,4 +1,4 @@
-//! The Rust twin of `plyflow.h` (ABI 1.1): same structs, same order, no dependencies.
+//! The Rust twin of `plyflow.h` (ABI 1.2): same structs, same order, no dependencies.
 //!
 //! The header is the reference text; what a field means, its shape, unit and index order are
 //! written there. A test compiles the header with the machine's C compiler and compares every
@@ -10,7 +10,7 @@
 use core::ffi::{c_char, c_void};
 
 pub const PF_ABI_MAJOR: u32 = 1;
-pub const PF_ABI_MINOR: u32 = 1;
+pub const PF_ABI_MINOR: u32 = 2;
 /// The bytes `PLYFLOW1` in memory on a little-endian machine.
 pub const PF_MAGIC: u64 = 0x3157_4F4C_4659_4C50;
 pub const PF_SYMBOL: &[u8] = b"plyflow_plugin\0";
@@ -306,7 +306,28 @@ pub struct pf_material_functions {
     pub sizes: unsafe extern "C" fn(*const c_void, *mut pf_material_sizes) -> i32,
     pub membrane: unsafe extern "C" fn(*const c_void, *const pf_membrane_batch) -> i32,
     pub bending: Option<unsafe extern "C" fn(*const c_void, *const pf_bending_batch) -> i32>,
+    pub tape: Option<pf_material_tape>,
 }
+
+pub type pf_material_tape =
+    unsafe extern "C" fn(*const c_void, u32, *const pf_writer, *mut pf_error) -> i32;
+
+impl pf_material_functions {
+    /// Its bytes in ABI 1.0 and 1.1.
+    pub const LEAST: usize = core::mem::offset_of!(pf_material_functions, tape);
+}
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct pf_writer {
+    pub host: *mut c_void,
+    pub write: unsafe extern "C" fn(*mut c_void, pf_str),
+}
+
+pub const PF_TAPE_MEMBRANE: u32 = 1;
+pub const PF_TAPE_BENDING: u32 = 2;
+pub const PF_TAPE_FORCES: u32 = 3;
+pub const PF_TAPE_PATCH_FORCES: u32 = 4;
 
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -415,4 +436,13 @@ pub struct pf_element_functions {
     pub forces: unsafe extern "C" fn(*const c_void, *const pf_element_batch) -> i32,
     pub patch_initialise: Option<unsafe extern "C" fn(*const c_void, *const pf_patch_batch) -> i32>,
     pub patch_forces: Option<unsafe extern "C" fn(*const c_void, *const pf_patch_batch) -> i32>,
+    pub tape: Option<pf_element_tape>,
+}
+
+pub type pf_element_tape =
+    unsafe extern "C" fn(*const c_void, u32, u32, *const pf_writer, *mut pf_error) -> i32;
+
+impl pf_element_functions {
+    /// Its bytes in ABI 1.0 and 1.1.
+    pub const LEAST: usize = core::mem::offset_of!(pf_element_functions, tape);
 }

@@ -37,6 +37,7 @@ fn rust_layouts() -> Layouts {
         }
         pf_step_functions { size, run }
         pf_error { text }
+        pf_writer { host, write }
         pf_material_sizes {
             size, membrane_history, bending_history, has_bending, reserved, thickness, areal_mass,
         }
@@ -46,7 +47,7 @@ fn rust_layouts() -> Layouts {
         pf_bending_batch {
             size, lanes, reserved, dt, metric, curvature, history, moment, energy, tangent,
         }
-        pf_material_functions { size, create, destroy, sizes, membrane, bending }
+        pf_material_functions { size, create, destroy, sizes, membrane, bending, tape }
         pf_material { functions, instance }
         pf_element_sizes {
             size, nodes, dofs_per_node, constants, history, material_points, fields, patch_nodes,
@@ -61,7 +62,7 @@ fn rust_layouts() -> Layouts {
             fields, stiffness, material,
         }
         pf_element_functions {
-            size, create, destroy, sizes, initialise, forces, patch_initialise, patch_forces,
+            size, create, destroy, sizes, initialise, forces, patch_initialise, patch_forces, tape,
         }
     }
 }
@@ -99,6 +100,10 @@ fn rust_constants() -> Vec<(&'static str, i64)> {
         PF_LOG_DEBUG,
         PF_RESULT_MEASURED,
         PF_ERROR_TEXT,
+        PF_TAPE_MEMBRANE,
+        PF_TAPE_BENDING,
+        PF_TAPE_FORCES,
+        PF_TAPE_PATCH_FORCES,
         PF_ENERGY_MEMBRANE,
         PF_ENERGY_BENDING,
         PF_ENERGY_HOURGLASS,

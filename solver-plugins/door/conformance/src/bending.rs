@@ -10,6 +10,7 @@ use crate::rules;
 use crate::run::{Run, Seen, worse};
 use crate::sequence::Sequence;
 use crate::slope::Energies;
+use crate::tapes;
 use plyflow_fixed::FixedBits;
 use plyflow_sdk::abi::*;
 
@@ -123,6 +124,36 @@ fn bits(history: &Guarded, a: &Answer, lanes: usize) -> Vec<Vec<u64>> {
         .collect()
 }
 
+/// The law's tape beside it, over states that follow each other.
+fn tape(law: &Law) -> Seen {
+    tapes::over(tapes::of_law(law, PF_TAPE_BENDING), |tape| {
+        let lanes = tapes::LANES;
+        let (mut history, mut states) = (start(law, lanes), 0);
+        for i in 0..16 {
+            let metric = metrics(lanes, 0.02, 501 + 2 * i);
+            let largest = [0.0, 1e-3, GENTLE, sharp(law)][i as usize % 4];
+            let curvature = curvatures(lanes, largest, 503 + 2 * i);
+            let before = history.slice().to_vec();
+            let a = call(law, &mut history, &metric, &curvature, Ask::EVERYTHING);
+            let given: [tapes::Rows<'_>; 4] = [
+                ("metric", &metric),
+                ("curvature", &curvature),
+                ("history", &before),
+                ("dt", &[DT]),
+            ];
+            let wanted: [tapes::Rows<'_>; 4] = [
+                ("moment", &a.moment),
+                ("energy", &a.energy),
+                ("tangent", &a.tangent),
+                ("history", history.slice()),
+            ];
+            tapes::held(tape, lanes, &given, &wanted, |_| true)?;
+            states += lanes;
+        }
+        Ok(states)
+    })
+}
+
 pub(crate) fn judge(run: &mut Run<'_>, law: &Law, twin: &Law) {
     if !law.bends() {
         return;
@@ -156,6 +187,7 @@ pub(crate) fn judge(run: &mut Run<'_>, law: &Law, twin: &Law) {
     run.check(rules::BENDING_LANES, || lanes(law));
     run.check(rules::BENDING_ASKING, || asking(law));
     run.check(rules::BENDING_THREADS, || threads(law));
+    run.check(rules::BENDING_TAPE, || tape(law));
     run.check(rules::BENDING_ZERO_DT, || {
         let (m, k) = (metrics(LANES, 0.02, 107), curvatures(LANES, GENTLE, 109));
         let sheet = |curvature| Sheet {

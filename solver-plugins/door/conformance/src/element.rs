@@ -7,7 +7,7 @@ use crate::run::{Run, Seen};
 use crate::sequence::Sequence;
 use crate::shapes::Elements;
 use crate::subject::{Answer, Masses, Motion, STRAIN, State, Subject};
-use crate::{element_motion, meeting, patch, rules};
+use crate::{element_motion, meeting, patch, rules, tapes};
 use plyflow_sdk::abi::*;
 
 /// Lanes of the sets that the mechanics are judged on.
@@ -53,6 +53,7 @@ pub unsafe fn check_element(
         run.check(rules::LANES, || lanes(subject));
         run.check(rules::ASKING, || asking(subject));
         run.check(rules::THREADS, || threads(subject));
+        run.check(rules::TAPE, || tapes::forces(subject));
         element_motion::judge(&mut run, subject, LANES);
         patch::judge(&mut run, subject, twin);
     }

@@ -29,6 +29,7 @@ mod sequence;
 mod shapes;
 mod slope;
 mod subject;
+mod tapes;
 
 pub use check::{Check, Outcome, Rule, Silent, Sink, failed};
 pub use element::check_element;

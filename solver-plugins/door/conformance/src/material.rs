@@ -6,7 +6,7 @@ use crate::check::{Check, Rule, Sink};
 use crate::law::{Answer, LANES, Law, STRAIN, metrics, trellis, undeformed, zero_dt};
 use crate::neighbours::{self, ALL, mixed, of_lanes};
 use crate::run::{Run, Seen};
-use crate::{bending, material_law, meeting, rules};
+use crate::{bending, material_law, meeting, rules, tapes};
 use plyflow_sdk::abi::*;
 
 /// Checks a material made with `parameters` (JSON, SI numbers, with `thickness` and `areal_mass`): its membrane part
@@ -164,6 +164,7 @@ fn judge(run: &mut Run<'_>, law: &Law, twin: &Law) {
         }
     });
     run.check(rules::THREADS, || threads(law));
+    run.check(rules::TAPE, || tapes::membrane(law));
     run.check(rules::ZERO_DT, || {
         zero_dt(|dt| {
             let mut history = law.start(LANES);

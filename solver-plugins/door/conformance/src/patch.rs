@@ -10,6 +10,7 @@ use crate::run::{Run, Seen, worse};
 use crate::shapes::{Patches, moved};
 use crate::subject::Subject;
 use crate::subject::patch::{PatchAnswer, PatchState};
+use crate::tapes;
 
 const LANES: usize = 16;
 
@@ -55,6 +56,7 @@ pub(crate) fn judge(run: &mut Run<'_>, subject: &Subject, twin: &Subject) {
     run.check(rules::PATCH_LANES, || lanes(subject));
     run.check(rules::PATCH_ASKING, || asking(subject, &patches));
     run.check(rules::PATCH_THREADS, || threads(subject));
+    run.check(rules::PATCH_TAPE, || tapes::patch_forces(subject));
     let case = Case::new(subject, &patches);
     run.check(rules::PATCH_REST, || case.rest());
     run.check(rules::PATCH_BALANCE, || case.balance());

@@ -60,6 +60,11 @@ pub(crate) const THREADS: Rule = rule(
     "several threads that call one instance at once get the bits that one thread gets",
     "keep no scratch memory in globals or in the instance: use the stack",
 );
+pub(crate) const TAPE: Rule = rule(
+    "tape",
+    "what `tape` writes, where it writes something, is a tape and gives the bits of the function",
+    "write down the operations of the function in its own order, each rounded once, with all that its parameters decide decided (docs/plugins/tape.md)",
+);
 pub(crate) const REST: Rule = rule(
     "rest",
     "no force and no energy in the reference position",
@@ -97,8 +102,8 @@ pub(crate) const STEP: Rule = rule(
 );
 
 /// Everything after the calls work at all.
-pub(crate) const OF_ELEMENTS: [Rule; 11] = [
-    REPEATABLE, LANES, ASKING, THREADS, REST, MASS, BALANCE, FRAME, ENERGY, WORK, STEP,
+pub(crate) const OF_ELEMENTS: [Rule; 12] = [
+    REPEATABLE, LANES, ASKING, THREADS, TAPE, REST, MASS, BALANCE, FRAME, ENERGY, WORK, STEP,
 ];
 
 pub(crate) const PATCH_GUARDS: Rule = rule("patch-guard-zones", GUARDS.expected, GUARDS.remedy);
@@ -112,6 +117,7 @@ pub(crate) const PATCH_REPEATABLE: Rule =
 pub(crate) const PATCH_LANES: Rule = rule("patch-batch-independence", LANES.expected, LANES.remedy);
 pub(crate) const PATCH_ASKING: Rule = rule("patch-asking", ASKING.expected, ASKING.remedy);
 pub(crate) const PATCH_THREADS: Rule = rule("patch-threads", THREADS.expected, THREADS.remedy);
+pub(crate) const PATCH_TAPE: Rule = rule("patch-tape", TAPE.expected, TAPE.remedy);
 pub(crate) const PATCH_REST: Rule = rule("patch-rest", REST.expected, REST.remedy);
 pub(crate) const PATCH_BALANCE: Rule = rule("patch-balance", BALANCE.expected, BALANCE.remedy);
 pub(crate) const PATCH_FRAME: Rule = rule("patch-frame-invariance", FRAME.expected, FRAME.remedy);
@@ -123,11 +129,12 @@ pub(crate) const PATCH_STIFFNESS: Rule = rule(
 );
 
 /// The patch part, after its calls work at all.
-pub(crate) const OF_PATCHES: [Rule; 9] = [
+pub(crate) const OF_PATCHES: [Rule; 10] = [
     PATCH_REPEATABLE,
     PATCH_LANES,
     PATCH_ASKING,
     PATCH_THREADS,
+    PATCH_TAPE,
     PATCH_REST,
     PATCH_BALANCE,
     PATCH_FRAME,
@@ -157,8 +164,8 @@ pub(crate) const ZERO_DT: Rule = rule(
     "the first call of a run has dt = 0: divide nothing by dt, and do not leave out the update when it is 0",
 );
 
-pub(crate) const OF_MATERIALS: [Rule; 9] = [
-    REPEATABLE, LANES, ASKING, THREADS, ZERO_DT, REST, STRESS, CYCLE, TANGENT,
+pub(crate) const OF_MATERIALS: [Rule; 10] = [
+    REPEATABLE, LANES, ASKING, THREADS, TAPE, ZERO_DT, REST, STRESS, CYCLE, TANGENT,
 ];
 
 pub(crate) const BENDING: Rule = rule(
@@ -172,6 +179,7 @@ pub(crate) const BENDING_REPEATABLE: Rule =
     rule("bending-repeatable", REPEATABLE.expected, REPEATABLE.remedy);
 pub(crate) const BENDING_ASKING: Rule = rule("bending-asking", ASKING.expected, ASKING.remedy);
 pub(crate) const BENDING_THREADS: Rule = rule("bending-threads", THREADS.expected, THREADS.remedy);
+pub(crate) const BENDING_TAPE: Rule = rule("bending-tape", TAPE.expected, TAPE.remedy);
 pub(crate) const BENDING_ZERO_DT: Rule = rule("bending-zero-dt", ZERO_DT.expected, ZERO_DT.remedy);
 pub(crate) const BENDING_REST: Rule = rule(
     "bending-rest",
@@ -193,11 +201,12 @@ pub(crate) const BENDING_CYCLE: Rule = rule(
     "a closed cycle of curvature gives back no more energy than was put in, and the energy is the work done",
     CYCLE.remedy,
 );
-pub(crate) const OF_BENDING: [Rule; 9] = [
+pub(crate) const OF_BENDING: [Rule; 10] = [
     BENDING_REPEATABLE,
     BENDING_LANES,
     BENDING_ASKING,
     BENDING_THREADS,
+    BENDING_TAPE,
     BENDING_ZERO_DT,
     BENDING_REST,
     MOMENT,

@@ -152,9 +152,17 @@ impl Subject {
         Ok(new)
     }
 
-    fn functions(&self) -> &pf_element_functions {
+    pub(crate) fn functions(&self) -> &pf_element_functions {
         // SAFETY: valid as long as the subject lives (`create`).
         unsafe { &*self.functions }
+    }
+
+    pub(crate) fn instance(&self) -> *const c_void {
+        self.instance
+    }
+
+    pub(crate) fn material(&self) -> &pf_material {
+        &self.material
     }
 
     pub(crate) fn has_patch_functions(&self) -> bool {

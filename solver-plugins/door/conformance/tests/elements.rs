@@ -13,7 +13,7 @@ use plyflow_kernels::rf4::Rf4;
 use plyflow_kernels::s4::S4;
 use plyflow_sdk::{Element, ElementBatch, ElementSizes, MaterialRef, PatchBatch};
 
-const MEMBRANE: [&str; 13] = [
+const MEMBRANE: [&str; 14] = [
     "create",
     "sizes",
     "status",
@@ -22,18 +22,20 @@ const MEMBRANE: [&str; 13] = [
     "finite",
     "batch-independence",
     "threads",
+    "tape",
     "mass",
     "balance",
     "frame-invariance",
     "energy",
     "critical-step",
 ];
-const PATCH: [&str; 8] = [
+const PATCH: [&str; 9] = [
     "patch-complete",
     "patch-repeatable",
     "patch-batch-independence",
     "patch-asking",
     "patch-threads",
+    "patch-tape",
     "patch-frame-invariance",
     "patch-energy",
     "patch-stiffness",

@@ -5,12 +5,12 @@ mod common;
 use common::{
     CRUSHED, FILM, ISOTROPIC, KINKED, LINEAR, TABULATED_FILM, WOVEN, ncf, of_material, sound,
 };
-use plyflow_conformance::{Check, failed};
+use plyflow_conformance::{Check, Outcome, failed};
 use plyflow_kernels::fabric::Fabric;
 use plyflow_kernels::fabric_linear::FabricLinear;
 use plyflow_kernels::isotropic::Isotropic;
 use plyflow_kernels::marlow::Marlow;
-use plyflow_sdk::{BendingBatch, Material, MaterialSizes, MembraneBatch};
+use plyflow_sdk::{BendingBatch, Material, MaterialSizes, MaterialTape, MembraneBatch};
 
 #[test]
 fn nothing_is_found_in_the_repository_s_own_materials() {
@@ -18,6 +18,7 @@ fn nothing_is_found_in_the_repository_s_own_materials() {
         "sizes",
         "guard-zones",
         "threads",
+        "tape",
         "zero-dt",
         "stress",
         "cycle",
@@ -28,6 +29,7 @@ fn nothing_is_found_in_the_repository_s_own_materials() {
         "bending-repeatable",
         "bending-asking",
         "bending-threads",
+        "bending-tape",
         "bending-zero-dt",
         "bending-rest",
         "moment",
@@ -201,4 +203,94 @@ impl Material for Slipping {
 fn nothing_is_found_in_a_law_whose_bending_slips() {
     let checks = of_material::<Slipping>(ISOTROPIC);
     sound(&checks, &["moment", "bending-cycle", "tangent"]);
+}
+
+/// Says that it does something else than it does.
+struct Liar(Isotropic, &'static str);
+
+impl Material for Liar {
+    const MANIFEST: &'static str = Isotropic::MANIFEST;
+    fn create(parameters: &str) -> Result<Self, String> {
+        let value: serde_json::Value =
+            serde_json::from_str(parameters).map_err(|e| e.to_string())?;
+        let lies = [
+            "another bit",
+            "no tape",
+            "a row that is not there",
+            "nothing of the energy",
+            "a panic",
+        ];
+        let lie = lies
+            .into_iter()
+            .find(|lie| value["lie"] == *lie)
+            .unwrap_or_default();
+        let mut honest = value.clone();
+        honest.as_object_mut().ok_or("no object")?.remove("lie");
+        Ok(Self(Isotropic::create(&honest.to_string())?, lie))
+    }
+    fn sizes(&self) -> MaterialSizes {
+        self.0.sizes()
+    }
+    fn membrane(&self, batch: &mut MembraneBatch<'_>) {
+        self.0.membrane(batch);
+    }
+    fn bending(&self, batch: &mut BendingBatch<'_>) {
+        self.0.bending(batch);
+    }
+    fn tape(&self, what: MaterialTape) -> Result<Option<String>, String> {
+        let Some(text) = self.0.tape(what)? else {
+            return Ok(None);
+        };
+        Ok(Some(match self.1 {
+            "another bit" => text.replacen("subtract", "add", 1),
+            "no tape" => "tape of a law".into(),
+            "a row that is not there" => text.replacen("load metric 0", "load metric 3", 1),
+            "nothing of the energy" => text
+                .lines()
+                .filter(|l| !l.contains("energy"))
+                .map(|l| format!("{l}\n"))
+                .collect(),
+            "a panic" => panic!("it fell over"),
+            _ => text,
+        }))
+    }
+}
+
+#[test]
+fn a_tape_that_is_not_what_the_law_does_is_found_out() {
+    let of = |lie: &str| {
+        let parameters = ISOTROPIC.trim_end().trim_end_matches('}');
+        let checks = of_material::<Liar>(&format!("{parameters}, \"lie\": \"{lie}\"}}"));
+        let bad: Vec<&str> = checks
+            .iter()
+            .filter(|c| c.outcome == Outcome::Failed)
+            .map(|c| c.rule.name)
+            .collect();
+        (bad.join(" "), seen(&checks, "tape").to_owned())
+    };
+    assert_eq!(
+        of(""),
+        (String::new(), "the same bits in 2560 states".into())
+    );
+    let (bad, told) = of("another bit");
+    assert_eq!(bad, "tape");
+    assert!(
+        told.starts_with("row 0 of 'stress' in lane 0: the function gives "),
+        "{told}"
+    );
+    let (bad, told) = of("no tape");
+    assert_eq!(
+        (bad.as_str(), told.as_str()),
+        ("tape bending-tape", "line 1: expected 'plyflow-tape 1'")
+    );
+    let (bad, told) = of("a row that is not there");
+    assert_eq!(bad, "tape");
+    assert!(told.ends_with("'metric' has 3 rows"), "{told}");
+    let (_, told) = of("nothing of the energy");
+    assert_eq!(told, "it does not write 'energy'");
+    let (_, told) = of("a panic");
+    assert_eq!(
+        told,
+        "tape returned 3: the component panicked: it fell over"
+    );
 }

@@ -93,6 +93,31 @@ pub trait Material: Sized + Send + Sync {
     fn bending(&self, batch: &mut BendingBatch<'_>) {
         batch.clear();
     }
+    /// What a function does to one lane, as a text (`docs/plugins/tape.md`); `None`: only this library can do it.
+    ///
+    /// # Errors
+    /// Why it could not be written down, though it should.
+    fn tape(&self, _: MaterialTape) -> Result<Option<String>, String> {
+        Ok(None)
+    }
+}
+
+/// A function of a material that a tape stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MaterialTape {
+    /// [`Material::membrane`], with stiffness.
+    Membrane,
+    /// [`Material::bending`], with tangents.
+    Bending,
+}
+
+/// A function of an element that a tape stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ElementTape {
+    /// [`Element::forces`].
+    Forces,
+    /// [`Element::patch_forces`] of a patch with so many nodes in use.
+    PatchForces(usize),
 }
 
 /// Sizes of an element formulation; see `pf_element_sizes`.
@@ -390,5 +415,12 @@ pub trait Element: Sized + Send + Sync {
     /// Patch forces and energies; called only with `patch_nodes > 0`.
     fn patch_forces(&self, _batch: &mut PatchBatch<'_>, _material: &MaterialRef) -> i32 {
         PF_OK
+    }
+    /// What a function does to one lane over a material of these sizes, as a text (`docs/plugins/tape.md`); `None`: only this library can do it.
+    ///
+    /// # Errors
+    /// Why it could not be written down, though it should.
+    fn tape(&self, _: ElementTape, _: &MaterialSizes) -> Result<Option<String>, String> {
+        Ok(None)
     }
 }

@@ -19,9 +19,9 @@ mod step;
 pub use aligned::Aligned;
 
 pub use component::{
-    BendingBatch, Constants, Element, ElementBatch, ElementSizes, Material, MaterialRef,
-    MaterialSizes, MembraneBatch, PatchBatch,
-    table::{element_table, material_table},
+    BendingBatch, Constants, Element, ElementBatch, ElementSizes, ElementTape, Material,
+    MaterialRef, MaterialSizes, MaterialTape, MembraneBatch, PatchBatch,
+    table::{LocalMaterial, element_table, material_table},
 };
 pub use error::StepError;
 pub use plyflow_abi as abi;

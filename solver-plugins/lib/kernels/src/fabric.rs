@@ -27,10 +27,11 @@ mod yarn;
 
 pub use ply::Fabric;
 
+use crate::record;
 use crate::{Lanes, dispatch};
 use parameters::Parameters;
 use ply::Form;
-use plyflow_sdk::{BendingBatch, Material, MaterialSizes, MembraneBatch};
+use plyflow_sdk::{BendingBatch, Material, MaterialSizes, MaterialTape, MembraneBatch};
 use shear::{ShearOf, Yarn};
 
 impl Material for Fabric {
@@ -79,6 +80,10 @@ impl Material for Fabric {
                 bending::rub(sliders, law.crossing.as_ref(), b.lanes, b.curvature, of);
             }
         }
+    }
+
+    fn tape(&self, what: MaterialTape) -> Result<Option<String>, String> {
+        record::of_material(self, what)
     }
 }
 

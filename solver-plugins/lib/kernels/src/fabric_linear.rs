@@ -8,9 +8,10 @@
 //! The families do not know of each other, as in a fabric and unlike in a plate. The law of an orthotropic sheet without coupling (any
 //! textbook, such as Jones, Mechanics of Composite Materials, 2.4, with nu12 = 0); it neither locks nor loses a stitch: `material-fabric` does.
 
+use crate::record;
 use crate::strain::{green_strain, store_with_work};
 use crate::{Lanes, WIDTH, dispatch};
-use plyflow_sdk::{BendingBatch, Material, MaterialSizes, MembraneBatch};
+use plyflow_sdk::{BendingBatch, Material, MaterialSizes, MaterialTape, MembraneBatch};
 
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -104,6 +105,10 @@ impl Material for FabricLinear {
             }
         }
     }
+
+    fn tape(&self, what: MaterialTape) -> Result<Option<String>, String> {
+        record::of_material(self, what)
+    }
 }
 
 dispatch!(fn membrane(
@@ -144,7 +149,8 @@ fn bending_kernel<V: Lanes>(
     energy: &mut [f64],
 ) {
     for c in (0..n).step_by(WIDTH) {
-        let k = [0, 1, 2].map(|r| V::load(curvature, r * n + c));
+        let row = |r: usize| V::load(curvature, r * n + c);
+        let k = [row(0), row(1), row(2)];
         linear(d, k, n, c, moment, energy);
     }
 }
@@ -152,5 +158,10 @@ fn bending_kernel<V: Lanes>(
 /// `s = [d0 e11, d1 e22, d2 e12]` and half its work on e.
 #[inline(always)]
 fn linear<V: Lanes>(d: [f64; 3], e: [V; 3], n: usize, c: usize, s: &mut [f64], energy: &mut [f64]) {
-    store_with_work([0, 1, 2].map(|r| V::splat(d[r]) * e[r]), e, n, c, s, energy);
+    let stress = [
+        V::splat(d[0]) * e[0],
+        V::splat(d[1]) * e[1],
+        V::splat(d[2]) * e[2],
+    ];
+    store_with_work(stress, e, n, c, s, energy);
 }

@@ -9,9 +9,10 @@
 //! for verification and for foils in small strain: like every St. Venant-Kirchhoff law it softens in
 //! strong compression. The metric has no influence on the moments.
 
+use crate::record;
 use crate::strain::{green_strain, store_with_work};
 use crate::{Lanes, WIDTH, dispatch};
-use plyflow_sdk::{BendingBatch, Material, MaterialSizes, MembraneBatch};
+use plyflow_sdk::{BendingBatch, Material, MaterialSizes, MaterialTape, MembraneBatch};
 
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -95,6 +96,10 @@ impl Material for Isotropic {
             tangent[..2 * n].fill(self.bending);
             tangent[2 * n..3 * n].fill(self.bending * (1.0 - self.nu));
         }
+    }
+
+    fn tape(&self, what: MaterialTape) -> Result<Option<String>, String> {
+        record::of_material(self, what)
     }
 }
 

@@ -4,8 +4,11 @@
 //! AVX-512, for AVX2 and for any machine. Only IEEE operations with one rounding are offered (no
 //! fused multiply-add), so all three give the same bits.
 
+use core::cell::Cell;
+use core::marker::PhantomData;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 use core::sync::atomic::{AtomicU8, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// Lanes in one value; batches are a multiple of it.
 pub const WIDTH: usize = 8;
@@ -53,14 +56,51 @@ pub trait Lanes:
     fn max(self, other: Self) -> Self;
     /// `self < other`, lane by lane.
     fn lt(self, other: Self) -> Self::Mask;
-    /// Whether the mask is true in every lane.
+    /// Whether the mask is true in every lane. Only to save work: what comes out must be the same, to the bit, when this is false though all lanes
+    /// are true, as it is where lanes are written down ([`crate::record`]).
     fn all(mask: Self::Mask) -> bool;
+    /// A promise of the caller that the mask is true in every lane; looked at with debug assertions.
+    #[inline(always)]
+    fn expect(mask: Self::Mask) {
+        debug_assert!(Self::all(mask));
+    }
     /// `if mask { yes } else { no }`, lane by lane.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// Magnitude of `self` with the sign of `sign`.
     fn copysign(self, sign: Self) -> Self;
     /// 2^n for `self` = 1.5 * 2^52 + n, n whole and from -1022 to 1023.
     fn power_of_two(self) -> Self;
+    /// Lane by lane the first `R` columns of the last row of `table` whose first column is not above `self`, of row 0 where there is none:
+    /// the same number of steps for every lane, of strides `stride`, `stride / 2`, .. 1. So `2 stride` rows are within reach (one, with 0); there
+    /// are that many.
+    #[inline(always)]
+    fn lookup<const R: usize, const N: usize>(
+        self,
+        table: &[[f64; 8]; N],
+        first: usize,
+    ) -> [Self; R] {
+        let mut at = [0.0; WIDTH];
+        self.store(&mut at, 0);
+        let mut rows = [[0.0; WIDTH]; R];
+        for l in 0..WIDTH {
+            let (mut i, mut stride) = (0, first);
+            while stride > 0 {
+                let next = i + stride;
+                i = if table[next % N][0] <= at[l] { next } else { i };
+                stride /= 2;
+            }
+            let row = &table[i % N];
+            for r in 0..R {
+                rows[r][l] = row[r];
+            }
+        }
+        // Not by `array::from_fn`, which is not compiled for the instruction set of the kernel.
+        let mut out = [self; R];
+        for r in 0..R {
+            out[r] = Self::load(&rows[r], 0);
+        }
+        out
+    }
 }
 
 /// Any machine.
@@ -405,13 +445,15 @@ pub enum Level {
 }
 
 const LEVELS: [Level; 3] = [Level::Portable, Level::Avx2, Level::Avx512];
-/// Index into `LEVELS`; 255 until the machine was asked.
-static LEVEL: AtomicU8 = AtomicU8::new(255);
+/// Index into `LEVELS`, with [`RECORDING`] while a thread records; [`UNKNOWN`] until the machine was asked.
+static LEVEL: AtomicU8 = AtomicU8::new(UNKNOWN);
+const UNKNOWN: u8 = 3;
+const RECORDING: u8 = 4;
 
 /// The instruction set in use: the best of this machine, unless [`limit_level`] said less.
 #[inline]
 pub fn level() -> Level {
-    match LEVELS.get(LEVEL.load(Ordering::Relaxed) as usize) {
+    match LEVELS.get((LEVEL.load(Ordering::Relaxed) & !RECORDING) as usize) {
         Some(level) => *level,
         None => limit_level(Level::Avx512),
     }
@@ -422,8 +464,67 @@ pub fn level() -> Level {
 #[cold]
 pub fn limit_level(most: Level) -> Level {
     let level = best_level().min(most);
-    LEVEL.store(level as u8, Ordering::Relaxed);
+    let with = |old: u8| Some(level as u8 | old & RECORDING);
+    let _ = LEVEL.fetch_update(Ordering::Relaxed, Ordering::Relaxed, with);
     level
+}
+
+/// How a kernel runs on this thread: with the widest instruction set, or written down.
+#[derive(Clone, Copy)]
+pub(crate) enum Way {
+    Run(Level),
+    Record,
+}
+
+/// As [`level`]; whether this thread records is asked only while one does.
+#[inline]
+pub(crate) fn way() -> Way {
+    match LEVELS.get(LEVEL.load(Ordering::Relaxed) as usize) {
+        Some(level) => Way::Run(*level),
+        None => seldom(),
+    }
+}
+
+#[cold]
+fn seldom() -> Way {
+    if RECORDS.get() {
+        Way::Record
+    } else {
+        Way::Run(level())
+    }
+}
+
+thread_local!(static RECORDS: Cell<bool> = const { Cell::new(false) });
+
+/// How many threads record.
+static RECORDERS: Mutex<usize> = Mutex::new(0);
+
+/// While it lives, kernels on its thread are written down.
+pub(crate) struct ThisRecords {
+    /// It belongs to the thread that began it.
+    _here: PhantomData<*const ()>,
+}
+
+impl ThisRecords {
+    pub(crate) fn begin() -> Self {
+        level();
+        let mut threads = RECORDERS.lock().unwrap_or_else(PoisonError::into_inner);
+        *threads += 1;
+        LEVEL.fetch_or(RECORDING, Ordering::Relaxed);
+        RECORDS.set(true);
+        Self { _here: PhantomData }
+    }
+}
+
+impl Drop for ThisRecords {
+    fn drop(&mut self) {
+        RECORDS.set(false);
+        let mut threads = RECORDERS.lock().unwrap_or_else(PoisonError::into_inner);
+        *threads -= 1;
+        if *threads == 0 {
+            LEVEL.fetch_and(!RECORDING, Ordering::Relaxed);
+        }
+    }
 }
 
 fn best_level() -> Level {
@@ -441,47 +542,3 @@ fn best_level() -> Level {
 
 /// Lanes of the batches that forming runs are made of: kernels are compiled for this number too.
 pub const USUAL: usize = 32;
-
-/// `dispatch!(fn name(arg: Type, ..) -> Ret = kernel);` defines `name`, which runs
-/// `kernel::<V>(arg, ..)` (generic over [`Lanes`], `#[inline(always)]`) with the widest lanes of
-/// the machine.
-///
-/// `= kernel, lanes n` does the same for a kernel whose argument `n` is the number of lanes: when it is
-/// [`USUAL`], code runs in which it, and with it the distance between rows, is a constant.
-macro_rules! dispatch {
-    ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident: $ty:ty),* $(,)?) $(-> $ret:ty)? = $kernel:ident $(, lanes $n:ident)?) => {
-        $(#[$meta])*
-        $vis fn $name($($arg: $ty),*) $(-> $ret)? {
-            // Lanes past the last would be those of the next row.
-            $(debug_assert!($n.is_multiple_of($crate::lanes::WIDTH), "{} lanes", $n);)?
-            #[cfg(target_arch = "x86_64")]
-            {
-                #[target_feature(enable = "avx512f,avx512dq")]
-                fn wide($($arg: $ty),*) $(-> $ret)? {
-                    $crate::lanes::dispatch!(@run $kernel::<$crate::lanes::Avx512> ($($arg),*) $($n)?)
-                }
-                #[target_feature(enable = "avx2")]
-                fn half($($arg: $ty),*) $(-> $ret)? {
-                    $crate::lanes::dispatch!(@run $kernel::<$crate::lanes::Avx2> ($($arg),*) $($n)?)
-                }
-                match $crate::lanes::level() {
-                    // SAFETY: `level` has found the instruction set on this machine.
-                    $crate::lanes::Level::Avx512 => return unsafe { wide($($arg),*) },
-                    // SAFETY: as above.
-                    $crate::lanes::Level::Avx2 => return unsafe { half($($arg),*) },
-                    $crate::lanes::Level::Portable => {}
-                }
-            }
-            $kernel::<$crate::lanes::Portable>($($arg),*)
-        }
-    };
-    (@run $kernel:ident::<$lanes:ty> $args:tt) => { $kernel::<$lanes> $args };
-    (@run $kernel:ident::<$lanes:ty> $args:tt $n:ident) => {{
-        if $n == $crate::lanes::USUAL {
-            let $n = $crate::lanes::USUAL;
-            return $kernel::<$lanes> $args;
-        }
-        $kernel::<$lanes> $args
-    }};
-}
-pub(crate) use dispatch;

@@ -11,6 +11,7 @@
 
 pub mod built_in;
 mod coupling;
+mod dispatch;
 pub mod fabric;
 pub mod fabric_linear;
 mod functions;
@@ -20,11 +21,13 @@ pub mod m4;
 pub mod m4f;
 pub mod marlow;
 pub mod quad;
+pub mod record;
 pub mod rf4;
 pub mod rows;
 pub mod s4;
 mod strain;
 mod thickening;
 
+pub(crate) use dispatch::dispatch;
 pub use functions::{asin, exp, polynomial};
 pub use lanes::*;

@@ -2,8 +2,9 @@
 //! M3D4R of the thesis). The mechanics stand in [`crate::quad`].
 
 use crate::quad::{self, Hourglass};
+use crate::record;
 use crate::thickening;
-use plyflow_sdk::{Element, ElementBatch, ElementSizes, MaterialRef};
+use plyflow_sdk::{Element, ElementBatch, ElementSizes, ElementTape, MaterialRef, MaterialSizes};
 
 /// Parameters of `m4` and `rf4`; see their manifests.
 #[derive(Clone, Copy, Debug, serde::Deserialize)]
@@ -75,5 +76,9 @@ impl Element for M4 {
 
     fn forces(&self, batch: &mut ElementBatch<'_>, material: &MaterialRef) -> i32 {
         quad::forces(batch, material)
+    }
+
+    fn tape(&self, what: ElementTape, material: &MaterialSizes) -> Result<Option<String>, String> {
+        record::of_element(self, what, *material)
     }
 }

@@ -15,10 +15,13 @@ use crate::quad::{
     FIELDS, MAX_LANES, Scratch, View, fields_of, largest, material_call, material_frame,
     stiffness_at_rest,
 };
+use crate::record;
 use crate::{Lanes, WIDTH, dispatch};
 use plyflow_geometry::vec3::{Vec3, cross, dot, sub};
 use plyflow_sdk::abi::{PF_ENERGIES, PF_OK};
-use plyflow_sdk::{Aligned, Element, ElementBatch, ElementSizes, MaterialRef};
+use plyflow_sdk::{
+    Aligned, Element, ElementBatch, ElementSizes, ElementTape, MaterialRef, MaterialSizes,
+};
 
 /// Points of the 2 x 2 Gauss rule.
 const POINTS: usize = 4;
@@ -121,6 +124,10 @@ impl Element for M4f {
             17..=32 => forces_with(batch, material, Scratch::<32>::new().view()),
             _ => forces_with(batch, material, Scratch::<MAX_LANES>::new().view()),
         }
+    }
+
+    fn tape(&self, what: ElementTape, material: &MaterialSizes) -> Result<Option<String>, String> {
+        record::of_element(self, what, *material)
     }
 }
 

@@ -11,9 +11,10 @@
 //! on along its tangent from det C = 0.001 downwards, so every state stays finite. There is no
 //! bending, and no resistance to compression besides incompressibility's.
 
+use crate::record;
 use crate::{Lanes, WIDTH, dispatch, exp};
 use plyflow_fixed::FixedBits;
-use plyflow_sdk::{Material, MaterialSizes, MembraneBatch};
+use plyflow_sdk::{Material, MaterialSizes, MaterialTape, MembraneBatch};
 use serde::Deserialize;
 
 /// Least det C at which 1/det C is evaluated.
@@ -263,6 +264,10 @@ impl Material for Marlow {
     fn membrane(&self, b: &mut MembraneBatch<'_>) {
         let stiffness = b.stiffness.as_deref_mut().unwrap_or(&mut []);
         membrane(self, b.lanes, b.metric, b.stress, b.energy, stiffness);
+    }
+
+    fn tape(&self, what: MaterialTape) -> Result<Option<String>, String> {
+        record::of_material(self, what)
     }
 }
 

@@ -29,11 +29,13 @@
 use crate::coupling;
 use crate::m4::Parameters;
 use crate::quad::{self, Hourglass, MAX_LANES, material_frame};
+use crate::record;
 use crate::{Lanes, WIDTH, dispatch, thickening};
 use plyflow_geometry::Vec3;
 use plyflow_sdk::abi::PF_OK;
 use plyflow_sdk::{
-    Aligned, BendingBatch, Element, ElementBatch, ElementSizes, MaterialRef, PatchBatch,
+    Aligned, BendingBatch, Element, ElementBatch, ElementSizes, ElementTape, MaterialRef,
+    MaterialSizes, PatchBatch,
 };
 
 /// Most nodes of a patch, the centre first.
@@ -131,6 +133,10 @@ impl Element for Rf4 {
             17..=32 => forces_with(batch, material, section, Scratch::<32>::new().view()),
             _ => forces_with(batch, material, section, Scratch::<MAX_LANES>::new().view()),
         }
+    }
+
+    fn tape(&self, what: ElementTape, material: &MaterialSizes) -> Result<Option<String>, String> {
+        record::of_element(self, what, *material)
     }
 }
 

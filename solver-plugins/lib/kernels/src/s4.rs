@@ -73,11 +73,13 @@ pub use section::S4;
 
 use crate::coupling;
 use crate::quad::{self, Hourglass, MAX_LANES, material_frame};
+use crate::record;
 use crate::thickening;
 use plyflow_geometry::Vec3;
 use plyflow_sdk::abi::{PF_BAD_SHAPE, PF_OK};
 use plyflow_sdk::{
-    BendingBatch, Constants, Element, ElementBatch, ElementSizes, MaterialRef, MembraneBatch,
+    BendingBatch, Constants, Element, ElementBatch, ElementSizes, ElementTape, MaterialRef,
+    MaterialSizes, MembraneBatch,
 };
 use section::{BendingRule, DIRECTORS, Layers, Parameters, Rest, Twist, row};
 
@@ -200,6 +202,10 @@ impl Element for S4 {
             17..=32 => self.forces_with(batch, material, forces::Scratch::<32>::new().view()),
             _ => self.forces_with(batch, material, forces::Scratch::<MAX_LANES>::new().view()),
         }
+    }
+
+    fn tape(&self, what: ElementTape, material: &MaterialSizes) -> Result<Option<String>, String> {
+        record::of_element(self, what, *material)
     }
 }
 

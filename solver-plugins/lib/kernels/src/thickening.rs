@@ -38,7 +38,8 @@ fn scale_kernel<V: Lanes>(
     energy: &mut [f64],
 ) {
     for c in (0..n).step_by(WIDTH) {
-        let [c11, c22, c12] = [0, 1, 2].map(|r| V::load(metric, r * n + c));
+        let (c11, c22) = (V::load(metric, c), V::load(metric, n + c));
+        let c12 = V::load(metric, 2 * n + c);
         let inverse = V::splat(1.0) / (c11 * c22 - c12 * c12).max(V::splat(LEAST));
         let thickness = inverse.sqrt();
         let factor = (0..power).fold(V::splat(1.0), |f, _| f * thickness);

@@ -7,8 +7,8 @@
 //! what is written. One row is shared by batches: constants, which are written in the initialise calls alone.
 
 use super::{
-    BendingBatch, Constants, Element, ElementBatch, ElementSizes, Material, MaterialRef,
-    MaterialSizes, MembraneBatch, PatchBatch,
+    BendingBatch, Constants, Element, ElementBatch, ElementSizes, ElementTape, Material,
+    MaterialRef, MaterialSizes, MaterialTape, MembraneBatch, PatchBatch,
 };
 use crate::error::panic_text;
 use plyflow_abi::*;
@@ -188,13 +188,48 @@ unsafe fn create_guarded<T>(
             format!("the component panicked: {}", panic_text(p.as_ref())),
         ),
     };
+    // SAFETY: the caller's promise.
+    unsafe { tell(error, &text) };
+    code
+}
+
+/// # Safety
+/// `error` is NULL or a whole struct that is the caller's own.
+unsafe fn tell(error: *mut pf_error, text: &str) {
     if !error.is_null() {
-        // SAFETY: not NULL, so a whole struct of the caller's own (its promise). Written as a whole first: in C it may begin as it lay in memory.
+        // SAFETY: not NULL, so a whole struct (the caller's promise). Written as a whole first: in C it may begin as it lay in memory.
         unsafe {
             error.write(pf_error::default());
-            (*error).set(&text);
+            (*error).set(text);
         }
     }
+}
+
+/// Writes the tape that `make` gives, if it gives one.
+///
+/// # Safety
+/// `to` is NULL or a writer of the host, `error` NULL or a whole struct, both the caller's own for the call.
+unsafe fn hand_tape(
+    to: *const pf_writer,
+    error: *mut pf_error,
+    make: impl FnOnce() -> Result<Option<String>, String>,
+) -> i32 {
+    let (code, text) = match catch_unwind(AssertUnwindSafe(make)) {
+        Ok(Ok(Some(_))) if to.is_null() => (PF_ERROR, "there is no writer (NULL)".to_owned()),
+        Ok(Ok(Some(text))) => {
+            // SAFETY: not NULL, so a writer (the caller's promise); the text is there for the call.
+            unsafe { ((*to).write)((*to).host, pf_str::new(&text)) };
+            return PF_OK;
+        }
+        Ok(Ok(None)) => return PF_NOT_FOUND,
+        Ok(Err(text)) => (PF_ERROR, text),
+        Err(p) => (
+            PF_PANIC,
+            format!("the component panicked: {}", panic_text(p.as_ref())),
+        ),
+    };
+    // SAFETY: the caller's promise.
+    unsafe { tell(error, &text) };
     code
 }
 
@@ -339,6 +374,26 @@ pub const fn element_table<E: Element>() -> pf_element_functions {
             i.element.patch_forces(&mut batch, &i.material)
         })
     }
+    unsafe extern "C" fn tape<E: Element>(
+        instance: *const c_void,
+        what: u32,
+        count: u32,
+        to: *const pf_writer,
+        error: *mut pf_error,
+    ) -> i32 {
+        let make = || {
+            // SAFETY: plyflow.h (see above): an instance of this table.
+            let i = unsafe { &*instance.cast::<ElementInstance<E>>() };
+            let what = match what {
+                PF_TAPE_FORCES => ElementTape::Forces,
+                PF_TAPE_PATCH_FORCES => ElementTape::PatchForces(count as usize),
+                other => return Err(format!("an element has no function {other}")),
+            };
+            i.element.tape(what, &i.material.sizes)
+        };
+        // SAFETY: plyflow.h (see above): a writer, and room for a text or none.
+        unsafe { hand_tape(to, error, make) }
+    }
     pf_element_functions {
         size: size_of::<pf_element_functions>() as u64,
         create: create::<E>,
@@ -348,12 +403,51 @@ pub const fn element_table<E: Element>() -> pf_element_functions {
         forces: forces::<E>,
         patch_initialise: Some(patch_initialise::<E>),
         patch_forces: Some(patch_forces::<E>),
+        tape: Some(tape::<E>),
     }
 }
 
 struct MaterialInstance<M> {
     material: M,
     sizes: MaterialSizes,
+}
+
+/// A material in this process, behind its function table, as elements see it: without a library, for tests and for whoever looks at an element.
+pub struct LocalMaterial<M> {
+    seen: MaterialRef,
+    // Where `seen` points to.
+    instance: Box<MaterialInstance<M>>,
+}
+
+impl<M: Material> LocalMaterial<M> {
+    const TABLE: &'static pf_material_functions = &material_table::<M>();
+
+    /// Takes a material.
+    ///
+    /// # Errors
+    /// When its sizes make no sense.
+    pub fn new(material: M) -> Result<Self, String> {
+        let sizes = material.sizes();
+        fits(&[sizes.membrane_history, sizes.bending_history])?;
+        let instance = Box::new(MaterialInstance { material, sizes });
+        let raw = pf_material {
+            functions: Self::TABLE,
+            instance: std::ptr::from_ref(&*instance).cast(),
+        };
+        // SAFETY: the table of this type is there for ever, and the instance as long as what points to it, which cannot be copied.
+        let seen = unsafe { MaterialRef::new(raw)? };
+        Ok(Self { seen, instance })
+    }
+
+    /// As elements see it.
+    pub fn seen(&self) -> &MaterialRef {
+        &self.seen
+    }
+
+    /// The material.
+    pub fn material(&self) -> &M {
+        &self.instance.material
+    }
 }
 
 /// The function table of a [`Material`]. Long, as it is written as [`element_table`].
@@ -446,6 +540,25 @@ pub const fn material_table<M: Material>() -> pf_material_functions {
             PF_OK
         })
     }
+    unsafe extern "C" fn tape<M: Material>(
+        instance: *const c_void,
+        what: u32,
+        to: *const pf_writer,
+        error: *mut pf_error,
+    ) -> i32 {
+        let make = || {
+            // SAFETY: plyflow.h (see above): an instance of this table.
+            let i = unsafe { &*instance.cast::<MaterialInstance<M>>() };
+            let what = match what {
+                PF_TAPE_MEMBRANE => MaterialTape::Membrane,
+                PF_TAPE_BENDING => MaterialTape::Bending,
+                other => return Err(format!("a material has no function {other}")),
+            };
+            i.material.tape(what)
+        };
+        // SAFETY: plyflow.h (see above): a writer, and room for a text or none.
+        unsafe { hand_tape(to, error, make) }
+    }
     pf_material_functions {
         size: size_of::<pf_material_functions>() as u64,
         create: create::<M>,
@@ -453,5 +566,6 @@ pub const fn material_table<M: Material>() -> pf_material_functions {
         sizes: sizes::<M>,
         membrane: membrane::<M>,
         bending: Some(bending::<M>),
+        tape: Some(tape::<M>),
     }
 }

@@ -111,33 +111,33 @@ fn rub_kernel<V: Lanes>(
             // Where it slides the moment does not grow any more.
             let sticks = slid.force.abs().lt(V::splat(slider.limit));
             let held = V::select(sticks, V::splat(slider.stiffness), zero);
-            let alone = |value: V| {
-                let mut of_all = [zero; 3];
-                of_all[family] = value;
-                of_all
-            };
-            let add = |to: &mut [f64], r: usize, value: V| {
-                (V::load(to, r * n + c) + value).store(to, r * n + c);
-            };
             match crossing {
                 Some(x) => {
-                    let (moment, tangent) = (x.moment(alone(slid.force)), x.diagonal(alone(held)));
+                    let (mut force, mut stiffness) = ([zero; 3], [zero; 3]);
+                    (force[family], stiffness[family]) = (slid.force, held);
+                    let (moment, tangent) = (x.moment(force), x.diagonal(stiffness));
                     for r in 0..3 {
-                        add(of.moment, r, moment[r]);
+                        add(of.moment, r * n + c, moment[r]);
                         if !of.tangent.is_empty() {
-                            add(of.tangent, r, tangent[r]);
+                            add(of.tangent, r * n + c, tangent[r]);
                         }
                     }
                 }
                 None => {
-                    add(of.moment, family, slid.force);
+                    add(of.moment, family * n + c, slid.force);
                     if !of.tangent.is_empty() {
-                        add(of.tangent, family, held);
+                        add(of.tangent, family * n + c, held);
                     }
                 }
             }
         }
     }
+}
+
+/// Adds to eight lanes.
+#[inline(always)]
+fn add<V: Lanes>(to: &mut [f64], at: usize, value: V) {
+    (V::load(to, at) + value).store(to, at);
 }
 
 dispatch!(pub(super) fn moments(
@@ -163,23 +163,54 @@ fn moments_kernel<V: Lanes>(
         ($family:expr) => {{
             let family = $family;
             match &law.crossing {
-                None => moments_of::<V>(law, family, n, curvature, moment, energy, tangent),
+                None => moments_of::<V>(law, &family, n, curvature, moment, energy, tangent),
                 Some(x) => {
-                    crossed_moments_of::<V>(law, x, family, n, curvature, moment, energy, tangent);
+                    crossed_moments_of::<V>(law, x, &family, n, curvature, moment, energy, tangent);
                 }
             }
         }};
     }
+    let signs = law.signs;
     match &law.laws {
-        Laws::Voce(laws) => of_laws!(|family, k| voce(&laws[family], law.signs[family], k)),
-        Laws::Any(laws) => of_laws!(|family, k| any(&laws[family], law.signs[family], k)),
+        Laws::Voce(laws) => of_laws!(OfVoce { laws, signs }),
+        Laws::Any(laws) => of_laws!(OfAny { laws, signs }),
+    }
+}
+
+/// Moment, energy and tangent of a family at its curvature. A trait, and no closure: what calls a closure more than once is not compiled
+/// for the instruction set of the kernel (`scripts/check-inlined`).
+trait OfFamily {
+    fn at<V: Lanes>(&self, family: usize, k: V) -> (V, V, V);
+}
+
+struct OfVoce<'a> {
+    laws: &'a [[Voce; 2]; 2],
+    signs: [f64; 2],
+}
+
+impl OfFamily for OfVoce<'_> {
+    #[inline(always)]
+    fn at<V: Lanes>(&self, family: usize, k: V) -> (V, V, V) {
+        voce(&self.laws[family], self.signs[family], k)
+    }
+}
+
+struct OfAny<'a> {
+    laws: &'a [[Law; 2]; 2],
+    signs: [f64; 2],
+}
+
+impl OfFamily for OfAny<'_> {
+    #[inline(always)]
+    fn at<V: Lanes>(&self, family: usize, k: V) -> (V, V, V) {
+        any(&self.laws[family], self.signs[family], k)
     }
 }
 
 #[inline(always)]
 fn moments_of<V: Lanes>(
     law: &Bending,
-    family_law: impl Fn(usize, V) -> (V, V, V),
+    family_law: &impl OfFamily,
     n: usize,
     curvature: &[f64],
     moment: &mut [f64],
@@ -193,7 +224,7 @@ fn moments_of<V: Lanes>(
         let mut w = twist * k12 * k12;
         for family in 0..2 {
             let k = V::load(curvature, family * n + c);
-            let (m, u, t) = family_law(family, k);
+            let (m, u, t) = family_law.at(family, k);
             m.store(moment, family * n + c);
             w = w + u;
             if !tangent.is_empty() {
@@ -212,7 +243,7 @@ fn moments_of<V: Lanes>(
 fn crossed_moments_of<V: Lanes>(
     law: &Bending,
     crossing: &Crossing,
-    family_law: impl Fn(usize, V) -> (V, V, V),
+    family_law: &impl OfFamily,
     n: usize,
     curvature: &[f64],
     moment: &mut [f64],
@@ -222,7 +253,7 @@ fn crossed_moments_of<V: Lanes>(
     let twist = V::splat(law.twist);
     for c in (0..n).step_by(WIDTH) {
         let [k1, k2, k12] = crossing.curvature([0, 1, 2].map(|r| V::load(curvature, r * n + c)));
-        let ((m1, w1, t1), (m2, w2, t2)) = (family_law(0, k1), family_law(1, k2));
+        let ((m1, w1, t1), (m2, w2, t2)) = (family_law.at(0, k1), family_law.at(1, k2));
         (w1 + w2 + twist * k12 * k12).store(energy, c);
         let moments = crossing.moment([m1, m2, twist * k12]);
         for (r, value) in moments.into_iter().enumerate() {

@@ -8,7 +8,7 @@
 //! factor over a length: the curve goes on along it, and the parabola's falls to 0 before the last
 //! point where the last interval is the longer one (points closer together where the curve bends).
 
-use crate::{Lanes, WIDTH};
+use crate::Lanes;
 use plyflow_fixed::FixedBits;
 
 /// Most points of a table.
@@ -17,13 +17,10 @@ pub(super) const MAX_POINTS: usize = 64;
 /// stable flat state.
 const LEAST_START: f64 = 0.25;
 
-/// `[start, c0, c1, c2, c3, integral up to start, 0, 0]` of one piece: one cache line.
-#[derive(Clone, Copy, Debug)]
+/// `[start, c0, c1, c2, c3, integral up to start, 0, 0]` of each piece, one a cache line.
+#[derive(Clone, Debug)]
 #[repr(align(64))]
-struct Piece([f64; 8]);
-
-/// Rows of a piece that the lanes need.
-const ROWS: usize = 6;
+struct Pieces([[f64; 8]; MAX_POINTS]);
 
 /// Value, slope and integral from 0 at a place.
 #[derive(Clone, Copy)]
@@ -36,7 +33,7 @@ pub(super) struct Cut<V> {
 /// The curve over `0 ..= end`.
 #[derive(Clone, Debug)]
 pub(super) struct Cubic {
-    pieces: Box<[Piece; MAX_POINTS]>,
+    pieces: Box<Pieces>,
     /// Half of the number of pieces, rounded up to a power of two: first stride of the search.
     stride: usize,
     /// Last place, and what the curve is there.
@@ -90,7 +87,7 @@ impl Cubic {
     pub(super) fn new(x: &[f64], y: &[f64]) -> Self {
         let m = slopes(x, y);
         // Places after the last piece are never reached: the search compares with infinity.
-        let mut pieces = Box::new([Piece([f64::INFINITY; 8]); MAX_POINTS]);
+        let mut pieces = Box::new(Pieces([[f64::INFINITY; 8]; MAX_POINTS]));
         let mut integral = 0.0;
         let last = x.len() - 1;
         for i in 0..last {
@@ -98,7 +95,7 @@ impl Cubic {
             let chord = (y[i + 1] - y[i]) / h;
             let c2 = (3.0 * chord - 2.0 * m[i] - m[i + 1]) / h;
             let c3 = (m[i] + m[i + 1] - 2.0 * chord) / (h * h);
-            pieces[i] = Piece([x[i], y[i], m[i], c2, c3, integral, 0.0, 0.0]);
+            pieces.0[i] = [x[i], y[i], m[i], c2, c3, integral, 0.0, 0.0];
             integral += h * (y[i] + h * (m[i] / 2.0 + h * (c2 / 3.0 + h * c3 / 4.0)));
         }
         Self {
@@ -112,11 +109,11 @@ impl Cubic {
 
     /// The largest slope of all.
     pub(super) fn steepest(&self) -> f64 {
-        let starts = |i: usize| self.pieces.get(i).map_or(f64::INFINITY, |p| p.0[0]);
-        let pieces = self.pieces.iter().enumerate();
-        let pieces = pieces.take_while(|(_, p)| p.0[0].is_finite());
+        let starts = |i: usize| self.pieces.0.get(i).map_or(f64::INFINITY, |p| p[0]);
+        let pieces = self.pieces.0.iter().enumerate();
+        let pieces = pieces.take_while(|(_, p)| p[0].is_finite());
         let within = pieces.map(|(i, p)| {
-            let [x, _, c1, c2, c3, ..] = p.0;
+            let [x, _, c1, c2, c3, ..] = *p;
             let h = starts(i + 1).min(self.end) - x;
             let at = |t: f64| c1 + t * (2.0 * c2 + 3.0 * c3 * t);
             // A slope is a parabola of the place.
@@ -133,46 +130,21 @@ impl Cubic {
 
     /// Slope at 0.
     pub(super) fn start_slope(&self) -> f64 {
-        self.pieces[0].0[2]
-    }
-
-    /// Index of the piece that holds `x`: the same number of steps for every `x`.
-    #[inline(always)]
-    fn find(&self, x: f64) -> usize {
-        let (mut i, mut stride) = (0, self.stride);
-        while stride > 0 {
-            let next = i + stride;
-            i = if self.pieces[next % MAX_POINTS].0[0] <= x {
-                next
-            } else {
-                i
-            };
-            stride /= 2;
-        }
-        i
+        self.pieces.0[0][2]
     }
 
     /// The curve at `x`, from 0 to the end.
     #[inline(always)]
     pub(super) fn at<V: Lanes>(&self, x: V) -> Cut<V> {
         let x = x.min(V::splat(self.end));
-        let mut at = [0.0; WIDTH];
-        x.store(&mut at, 0);
-        let mut rows = [[0.0; WIDTH]; ROWS];
-        for l in 0..WIDTH {
-            let piece = &self.pieces[self.find(at[l]) % MAX_POINTS].0;
-            for r in 0..ROWS {
-                rows[r][l] = piece[r];
-            }
-        }
-        let row = |r: usize| V::load(&rows[r], 0);
-        let (x, c0, c1, c2, c3) = (x - row(0), row(1), row(2), row(3), row(4));
+        let [start, c0, c1, c2, c3, before] = x.lookup(&self.pieces.0, self.stride);
+        let x = x - start;
         let (half, third, quarter) = (V::splat(0.5), V::splat(1.0 / 3.0), V::splat(0.25));
         let (two, three) = (V::splat(2.0), V::splat(3.0));
         Cut {
             value: c0 + x * (c1 + x * (c2 + x * c3)),
             slope: c1 + x * (two * c2 + three * x * c3),
-            integral: row(5) + x * (c0 + x * (half * c1 + x * (third * c2 + x * (quarter * c3)))),
+            integral: before + x * (c0 + x * (half * c1 + x * (third * c2 + x * (quarter * c3)))),
         }
     }
 }
@@ -180,7 +152,7 @@ impl Cubic {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Portable;
+    use crate::{Portable, WIDTH};
 
     fn at(c: &Cubic, x: f64) -> (f64, f64, f64) {
         let cut = c.at(Portable::splat(x));

@@ -22,6 +22,48 @@ use crate::{Lanes, WIDTH};
 pub(super) const HISTORY: usize = 11;
 const SINE_LIMIT: f64 = 0.985;
 
+/// A fibre's stress from `n` after a step to the stretch `l` from `o` with the strain increment `e`, and what it does meanwhile (J/m2). A step that
+/// passes l = 1 has each modulus, in tension and in compression, for its own part, where they are uneven: with one of them for all of it fibres
+/// that tremble about no strain would make energy.
+#[inline(always)]
+fn fibre<V: Lanes>(
+    [tension, compression]: [V; 2],
+    uneven: bool,
+    n: V,
+    [l, o]: [V; 2],
+    e: V,
+) -> (V, V) {
+    let (half, one) = (V::splat(0.5), V::splat(1.0));
+    let (below, was_below) = (l.lt(one), o.lt(one));
+    let k = V::select(below, compression, tension);
+    let (m, work) = (n + k * e, half * (n + (n + k * e)) * e);
+    if !uneven {
+        return (m, work);
+    }
+    let before = V::select(was_below, compression, tension);
+    let (a, b) = (from_rest(l), from_rest(o));
+    let passed = n + (k * a - before * b);
+    let through = half * (passed * a - n * b);
+    (
+        if_passed(below, was_below, passed, m),
+        if_passed(below, was_below, through, work),
+    )
+}
+
+/// The strain from rest to the stretch `l`, as increments are measured.
+#[inline(always)]
+fn from_rest<V: Lanes>(l: V) -> V {
+    let one = V::splat(1.0);
+    V::splat(2.0) * (l - one) / (l + one)
+}
+
+/// `yes` where one of both is true alone.
+#[inline(always)]
+fn if_passed<V: Lanes>(below: V::Mask, was_below: V::Mask, yes: V, no: V) -> V {
+    let from_below = V::select(was_below, no, yes);
+    V::select(below, from_below, V::select(was_below, yes, no))
+}
+
 /// Stresses and energies from the metric and the [`HISTORY`]; `stiffness` may be empty.
 /// Long, as it is the loop of a kernel: pieces of it would share most of its values, and its speed would hang on how they are inlined.
 #[inline(always)]
@@ -37,30 +79,8 @@ pub(super) fn membrane<V: Lanes, L: Law, const SLIDES: bool>(
 ) {
     let (half, one, two) = (V::splat(0.5), V::splat(1.0), V::splat(2.0));
     let (least, end) = (V::splat(LEAST), V::splat(SINE_LIMIT));
-    let sine = |c12: V, r: V| (c12 * r).max(-end).min(end);
     let (tension, compression) = (f.tension.map(V::splat), f.compression.map(V::splat));
     let uneven = f.tension != f.compression;
-    // Of a family: a fibre's stress after a step from the stretch `o` to `l` with the strain increment `e`, and what it does meanwhile (J/m2). A step that
-    // passes l = 1 has each modulus for its own part: with one of them for all of it fibres that tremble about no strain would make energy.
-    let fibre = |family: usize, n: V, l: V, o: V, e: V| {
-        let (tension, compression) = (tension[family], compression[family]);
-        let k = V::select(l.lt(one), compression, tension);
-        let (m, work) = (n + k * e, half * (n + (n + k * e)) * e);
-        if !uneven {
-            return (m, work);
-        }
-        let from_rest = |l: V| two * (l - one) / (l + one);
-        let before = V::select(o.lt(one), compression, tension);
-        let (a, b) = (from_rest(l), from_rest(o));
-        let passed = n + (k * a - before * b);
-        let through = half * (passed * a - n * b);
-        let passes = |yes: V, no: V| {
-            let (from_below, from_above) =
-                (V::select(o.lt(one), no, yes), V::select(o.lt(one), yes, no));
-            V::select(l.lt(one), from_below, from_above)
-        };
-        (passes(passed, m), passes(through, work))
-    };
     for c in (0..n).step_by(WIDTH) {
         let row = |h: &[f64], r: usize| V::load(h, r * n + c);
         let raw: [V; 3] = [row(metric, 0), row(metric, 1), row(metric, 2)];
@@ -71,16 +91,17 @@ pub(super) fn membrane<V: Lanes, L: Law, const SLIDES: bool>(
         );
         let (l1, l2, o1, o2) = (c11.sqrt(), c22.sqrt(), p11.sqrt(), p22.sqrt());
         let (r1, r2) = (one / l1, one / l2);
-        let s = sine(raw[2], r1 * r2);
-        let before = sine(row(history, 2), one / (o1 * o2));
+        let s = (raw[2] * (r1 * r2)).max(-end).min(end);
+        let before = (row(history, 2) * (one / (o1 * o2))).max(-end).min(end);
         let cosine = (one - s * s).sqrt();
         // Increments of the fibres' logarithmic strains and of the angle at mid-step.
         let e1 = two * (l1 - o1) / (l1 + o1);
         let e2 = two * (l2 - o2) / (l2 + o2);
         let ratio = s / cosine;
         let middle = half * (ratio + before / (one - before * before).sqrt());
-        let (m1, w1) = fibre(0, row(history, 3), l1, o1, e1);
-        let (m2, w2) = fibre(1, row(history, 4), l2, o2, e2);
+        let moduli = |family: usize| [tension[family], compression[family]];
+        let (m1, w1) = fibre(moduli(0), uneven, row(history, 3), [l1, o1], e1);
+        let (m2, w2) = fibre(moduli(1), uneven, row(history, 4), [l2, o2], e2);
         // Shear stress of each frame.
         let (mut response, g, gs) = law.with_stitch(s, row(history, 9), row(history, 10));
         if SLIDES && let Some(slider) = &f.shear.slider {

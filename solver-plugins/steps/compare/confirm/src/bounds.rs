@@ -15,6 +15,8 @@ pub struct Measured {
     pub by_elements: Vec<[f64; 2]>,
     /// The size in each other variant that has the defect.
     pub others: Vec<f64>,
+    /// Share of the size by which all of these runs may be wrong together.
+    pub shared: f64,
 }
 
 /// Bounds of a size (SI).
@@ -88,8 +90,8 @@ fn order([h1, h2, h3]: [f64; 3], ratio: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Bounds of a size: about its value in the finest run, what is left of the elements' error there and the changes of the other variants, up and down
-/// apart, as independent contributions (root of the sum of squares, JCGM 100:2008, 5.1.2); and never narrower than what was measured.
+/// Bounds of a size: about its value in the finest run, what is left of the elements' error there, what all runs share, and the changes of the other
+/// variants, up and down apart, as independent contributions (root of the sum of squares, JCGM 100:2008, 5.1.2); and never narrower than what was measured.
 pub fn bounds(measured: &Measured) -> Bounds {
     let runs = &measured.by_elements;
     let (first, finest) = (runs[0][1], runs[runs.len() - 1][1]);
@@ -99,7 +101,9 @@ pub fn bounds(measured: &Measured) -> Bounds {
             .others
             .iter()
             .map(|v| (sign * (v - first)).max(0.0));
-        changes.fold(left.error * left.error, |sum, c| sum + c * c)
+        let shared = measured.shared * finest;
+        let of_all = left.error * left.error + shared * shared;
+        changes.fold(of_all, |sum, c| sum + c * c)
     };
     let all = || {
         let of_elements = runs.iter().map(|r| r[1]);

@@ -22,9 +22,13 @@ pub struct Confirm;
 
 export_step!(Confirm);
 
-#[derive(Deserialize)]
-struct Tolerance {
+/// Shares of a size.
+#[derive(Clone, Copy, Deserialize)]
+struct Shares {
+    /// By which it may change in a variant.
     tolerance: f64,
+    /// By which all runs may be wrong together.
+    shared_error: f64,
 }
 
 /// Defects that do not stay and are named in the warning.
@@ -35,7 +39,7 @@ impl Step for Confirm {
 
     fn run(host: &Host) -> Result<(), StepError> {
         let settings: Settings = host.parameters()?;
-        let Tolerance { tolerance } = host.parameters()?;
+        let shares: Shares = host.parameters()?;
         host.progress(&Progress {
             phase: "reading",
             ..Default::default()
@@ -47,7 +51,7 @@ impl Step for Confirm {
             ..Default::default()
         });
         let tracks = follow::follow(host, &all, &settings)?;
-        let told = told::told(&all, &tracks, tolerance);
+        let told = told::told(&all, &tracks, shares);
         warn(host, &told);
         host.write_attributes(&told)?;
         write_results(host, &told)

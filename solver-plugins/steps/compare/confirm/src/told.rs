@@ -1,5 +1,6 @@
 //! What is said of each defect, and of the answer as a whole.
 
+use crate::Shares;
 use crate::bounds::{Measured, bounds};
 use crate::follow::{Followed, Seen, Tracks, place};
 use crate::judged::judged;
@@ -93,11 +94,11 @@ pub fn sizes(kind: Kind) -> (&'static [Size], usize) {
 }
 
 /// All that is said.
-pub fn told(all: &All, tracks: &Tracks, tolerance: f64) -> Confirmation {
+pub(crate) fn told(all: &All, tracks: &Tracks, shares: Shares) -> Confirmation {
     let defects: Vec<ConfirmedDefect> = tracks
         .followed
         .iter()
-        .map(|d| one(all, d, tolerance))
+        .map(|d| one(all, d, shares))
         .collect();
     let left_out: Vec<Variation> = (Variation::ALL.into_iter())
         .filter(|v| !all.zones.is_empty() && all.variants.iter().all(|o| o.variant != *v))
@@ -108,7 +109,7 @@ pub fn told(all: &All, tracks: &Tracks, tolerance: f64) -> Confirmation {
     let mut tables = vec![table(all, tracks, &defects)];
     tables.extend((!new.is_empty()).then(|| table_of_new(&new)));
     Confirmation {
-        tolerance,
+        tolerance: shares.tolerance,
         variants: (all.variants.iter().zip(&tracks.count))
             .map(|(v, count)| ConfirmVariant {
                 variant: v.variant,
@@ -128,7 +129,7 @@ pub fn told(all: &All, tracks: &Tracks, tolerance: f64) -> Confirmation {
 }
 
 /// What is said of a defect.
-fn one(all: &All, of: &Followed, tolerance: f64) -> ConfirmedDefect {
+fn one(all: &All, of: &Followed, shares: Shares) -> ConfirmedDefect {
     let (names, deciding) = sizes(of.defect.kind);
     let mut hangs_on = Vec::new();
     for (variant, seen) in all.variants.iter().zip(&of.seen) {
@@ -149,7 +150,7 @@ fn one(all: &All, of: &Followed, tolerance: f64) -> ConfirmedDefect {
         for size in &names[..deciding] {
             let value = size.of(&of.defect);
             let change = (size.of(there) - value) / value;
-            if change.abs() > tolerance {
+            if change.abs() > shares.tolerance {
                 hangs_on.push(HangsOn {
                     variant,
                     size: Some(size.name().into()),
@@ -165,7 +166,7 @@ fn one(all: &All, of: &Followed, tolerance: f64) -> ConfirmedDefect {
         _ => Stands::Hangs,
     };
     let sizes: BTreeMap<String, ConfirmedSize> = (names.iter())
-        .map(|s| (s.name().to_owned(), size(all, of, *s)))
+        .map(|s| (s.name().to_owned(), size(all, of, *s, shares.shared_error)))
         .collect();
     let main = &sizes[names[0].name()];
     let text = format!(
@@ -187,11 +188,12 @@ fn one(all: &All, of: &Followed, tolerance: f64) -> ConfirmedDefect {
 }
 
 /// A size with its bounds.
-fn size(all: &All, of: &Followed, size: Size) -> ConfirmedSize {
+fn size(all: &All, of: &Followed, size: Size, shared: f64) -> ConfirmedSize {
     let value = size.of(&of.defect);
     let mut measured = Measured {
         by_elements: vec![[all.base[of.zone].element_size, value]],
         others: Vec::new(),
+        shared,
     };
     let mut by = BTreeMap::new();
     for (variant, seen) in all.variants.iter().zip(&of.seen) {

@@ -15,7 +15,20 @@ fn of(by_elements: &[[f64; 2]], others: &[f64]) -> Bounds {
     bounds(&Measured {
         by_elements: by_elements.to_vec(),
         others: others.to_vec(),
+        shared: 0.0,
     })
+}
+
+#[test]
+fn what_all_runs_share_counts_beside_what_they_differ_by() {
+    let found = bounds(&Measured {
+        by_elements: vec![[0.004, 0.050]],
+        others: vec![0.053],
+        shared: 0.08,
+    });
+    // 8 % of 50 mm are 4 mm; with 3 mm beside them 5 mm.
+    assert!((found.low - 0.046).abs() < 1e-12, "{found:?}");
+    assert!((found.high - 0.055).abs() < 1e-12, "{found:?}");
 }
 
 #[test]
