@@ -223,3 +223,34 @@ fn check_pointers(kind: PluginKind, functions: *const c_void) -> Result<(), Brea
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a plugin of ABI 1.1 was compiled with: the table without its last function. Whoever read beyond its end would find the mark.
+    #[repr(C)]
+    struct Old {
+        table: [u64; 6],
+        mark: u64,
+    }
+
+    #[test]
+    fn a_table_of_an_earlier_minor_version_is_read_no_further_than_its_size() {
+        let size = pf_material_functions::LEAST as u64;
+        let old = Old {
+            table: [size, 11, 12, 13, 14, 15],
+            mark: 0xbad,
+        };
+        let functions: *const c_void = (&raw const old).cast();
+        let whole = size_of::<pf_material_functions>();
+        let wide = widened(functions, size, whole);
+        assert_ne!(wide, functions);
+        // SAFETY: a table that `widened` has made: the size and six functions.
+        let words = unsafe { std::slice::from_raw_parts(wide.cast::<u64>(), 7) };
+        assert_eq!(words, [whole as u64, 11, 12, 13, 14, 15, 0]);
+        assert_eq!(old.mark, 0xbad);
+        // One of today stays where it is.
+        assert_eq!(widened(functions, whole as u64, whole), functions);
+    }
+}

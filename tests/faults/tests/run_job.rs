@@ -314,7 +314,7 @@ fn loading_is_refused_with_what_was_found_and_expected() {
     for (plugin, expected) in [
         (
             "wrong-abi",
-            "ABI 99.0; this program accepts 1.0 to 1.1: update Plyflow",
+            "ABI 99.0; this program accepts 1.0 to 1.2: update Plyflow",
         ),
         ("bad-magic", "0x0000000000001234 instead of PF_MAGIC"),
         ("bad-manifest", "does not follow schemas/manifest.md"),
