@@ -52,7 +52,7 @@ check: ## form, lints and the tests that need no HDF5: under a minute once built
 test: ## run all tests, also with VTK's own reader, Chromium and a step in C
 	@scripts/setup tests
 	. ./.tools/env && scripts/run-tests $(CARGO_FLAGS) --workspace
-	scripts/check-inlined
+	. ./.tools/env && scripts/check-inlined
 	scripts/check-vtk
 	scripts/check-report
 
