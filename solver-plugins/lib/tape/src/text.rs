@@ -38,6 +38,8 @@ use std::fmt::{self, Write};
 const HEAD: &str = "plyflow-tape 1";
 /// Most bytes of a text that is read: the largest of Plyflow's own tapes takes 60,000.
 const MOST: usize = 16 << 20;
+/// Most buffers, tables and calls: Plyflow's own have nine, two and four.
+const MOST_OF_A_KIND: usize = 1000;
 
 impl fmt::Display for Tape {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -243,6 +245,14 @@ fn whole(word: &str, what: &str) -> Result<u16, String> {
         .map_err(|_| format!("'{}' is no {what} (0 to 65535)", short(word)))
 }
 
+/// Whether there may be one more.
+fn room(so_far: usize, what: &str) -> Result<(), String> {
+    if so_far < MOST_OF_A_KIND {
+        return Ok(());
+    }
+    Err(format!("more than {MOST_OF_A_KIND} {what}"))
+}
+
 /// A word of a stranger in a message: not long, and nothing that a terminal obeys.
 fn short(word: &str) -> String {
     let shown: String = word
@@ -282,6 +292,7 @@ impl<'t> Reader<'t> {
             ["buffer", name, rows, "uniform"] => self.buffer(name, rows, true),
             ["table", name, stride] => {
                 self.new_name(name)?;
+                room(self.tables.len(), "tables")?;
                 self.tables
                     .push((name, whole(stride, "stride")?.into(), Vec::new()));
                 Ok(())
@@ -289,6 +300,7 @@ impl<'t> Reader<'t> {
             ["row", ref numbers @ ..] => self.row(numbers),
             ["call", name, of] => {
                 self.new_name(name)?;
+                room(self.calls.len(), "calls")?;
                 let of = of.to_owned();
                 let (arguments, results) = (Vec::new(), Vec::new());
                 self.calls.push((
@@ -350,6 +362,7 @@ impl<'t> Reader<'t> {
     }
 
     fn buffer(&mut self, name: &'t str, rows: &str, uniform: bool) -> Result<(), String> {
+        room(self.buffers.len(), "buffers")?;
         let index = self
             .builder
             .buffer(name, whole(rows, "number of rows")?, uniform);

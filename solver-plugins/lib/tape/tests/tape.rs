@@ -361,3 +361,74 @@ fn the_tape_of_the_page_does_what_the_page_says() {
         (wanted, [0.5 * (wanted[0] * e11)], [4e5, 0.0])
     );
 }
+
+#[test]
+fn no_text_of_a_stranger_breaks_the_reader() {
+    let texts = [
+        by_hand().to_string(),
+        asks().to_string(),
+        "plyflow-tape 1\ntable t 2\nrow 0 1 2 3 4 5 6 7\nbuffer x 1\na = load x 0\nb = find t a\n"
+            .into(),
+    ];
+    let mut seed = 7u64;
+    let mut next = |below: usize| {
+        seed = seed
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 33) as usize % below
+    };
+    let words = [
+        "buffer ",
+        "x ",
+        "y ",
+        "0 ",
+        "65535 ",
+        "-1 ",
+        "1e999 ",
+        "0x7ff0000000000000 ",
+        "= ",
+        "load ",
+        "find ",
+        "call ",
+        "result ",
+        "store ",
+        "row ",
+        "\n",
+        "v0",
+        "v8",
+    ];
+    let (mut read, mut refused) = (0, 0);
+    for i in 0..60_000 {
+        let mut parts: Vec<&str> = texts[i % texts.len()]
+            .split_inclusive([' ', '\n'])
+            .collect();
+        for _ in 0..=next(2) {
+            let at = next(parts.len());
+            match next(3) {
+                0 => drop(parts.remove(at)),
+                1 => parts[at] = words[next(words.len())],
+                _ => parts.insert(at, words[next(words.len())]),
+            }
+        }
+        match Tape::read(&parts.concat()) {
+            Ok(tape) => {
+                read += 1;
+                let again =
+                    Tape::read(&tape.to_string()).expect("what is read can be written and read");
+                assert_eq!(again.to_string(), tape.to_string());
+            }
+            Err(_) => refused += 1,
+        }
+    }
+    assert!(
+        read > 500 && refused > 500,
+        "{read} read, {refused} refused"
+    );
+    let many = (0..2000).fold("plyflow-tape 1\n".to_owned(), |text, i| {
+        text + &format!("buffer b{i} 1\n")
+    });
+    assert_eq!(
+        Tape::read(&many).expect_err("too many").0,
+        "line 1002: more than 1000 buffers"
+    );
+}
