@@ -7,7 +7,7 @@ use crate::sequence::Sequence;
 use crate::shapes::{Elements, Patches};
 use crate::subject::{Motion, Subject};
 use plyflow_sdk::abi::*;
-use plyflow_tape::Tape;
+use plyflow_tape::{Buffer, Tape};
 use std::ffi::c_void;
 
 pub(crate) const LANES: usize = 64;
@@ -63,6 +63,45 @@ unsafe fn of_material(
     read(|to, error| unsafe { tape(instance, what, to, error) })
 }
 
+/// The rows of a name.
+fn rows<'a>(of: &[Rows<'a>], name: &str) -> Option<&'a [f64]> {
+    of.iter().find(|r| r.0 == name).map(|r| r.1)
+}
+
+/// A slice for each buffer of a tape: what the function was given, or room for what it writes.
+fn slices(
+    tape: &Tape,
+    lanes: usize,
+    given: &[Rows<'_>],
+    wanted: &[Rows<'_>],
+) -> Result<Vec<Vec<f64>>, String> {
+    if let Some(call) = tape.calls.first() {
+        return Err(format!("it calls '{}', as elements alone do", call.of));
+    }
+    // A device would write it too.
+    let mut stored = (tape.stores.iter()).map(|s| &tape.buffers[s.to.buffer as usize].name);
+    if let Some(name) = stored.find(|name| rows(wanted, name).is_none()) {
+        return Err(format!("it writes '{name}', which its function does not"));
+    }
+    let one = |b: &Buffer| {
+        let room = || rows(wanted, &b.name).map(|rows| vec![f64::NAN; rows.len()]);
+        let slice = rows(given, &b.name).map(<[f64]>::to_vec).or_else(room);
+        let slice = slice
+            .ok_or_else(|| format!("it has a buffer '{}', which its function has not", b.name))?;
+        if slice.len() == b.rows as usize * if b.uniform { 1 } else { lanes } {
+            return Ok(slice);
+        }
+        Err(format!(
+            "its buffer '{}' has {} rows{}; the function's has {} numbers for {lanes} lanes",
+            b.name,
+            b.rows,
+            if b.uniform { ", uniform" } else { "" },
+            slice.len()
+        ))
+    };
+    tape.buffers.iter().map(one).collect()
+}
+
 /// Runs a tape on what the function was given and holds it against what it wrote, in the lanes that count.
 pub(crate) fn held(
     tape: &Tape,
@@ -71,34 +110,13 @@ pub(crate) fn held(
     wanted: &[Rows<'_>],
     counts: impl Fn(usize) -> bool,
 ) -> Result<(), String> {
-    let find = |rows: &[Rows<'_>], name: &str| {
-        let found = rows.iter().find(|r| r.0 == name);
-        found.map(|(_, rows)| rows.to_vec())
-    };
-    let mut slices: Vec<Vec<f64>> = Vec::new();
-    for b in &tape.buffers {
-        let length = b.rows as usize * if b.uniform { 1 } else { lanes };
-        let written = find(wanted, &b.name).map(|rows| vec![f64::NAN; rows.len()]);
-        let slice = find(given, &b.name).or(written);
-        let slice = slice
-            .ok_or_else(|| format!("it has a buffer '{}', which its function has not", b.name))?;
-        if slice.len() != length {
-            return Err(format!(
-                "its buffer '{}' has {} rows{}; the function's has {} numbers for {lanes} lanes",
-                b.name,
-                b.rows,
-                if b.uniform { ", uniform" } else { "" },
-                slice.len()
-            ));
-        }
-        slices.push(slice);
-    }
+    let mut slices = slices(tape, lanes, given, wanted)?;
     let mut now: Vec<&mut [f64]> = slices.iter_mut().map(|s| &mut s[..]).collect();
     let _ = tape.run(lanes, &mut now);
     for (name, wanted) in wanted {
         let at = tape.buffers.iter().position(|b| b.name == *name);
         // What a tape does not name stays as it was.
-        let Some(gave) = at.map(|i| slices[i].clone()).or_else(|| find(given, name)) else {
+        let Some(gave) = at.map(|i| &slices[i][..]).or_else(|| rows(given, name)) else {
             if wanted.is_empty() {
                 continue;
             }

@@ -218,6 +218,8 @@ impl Material for Liar {
             "no tape",
             "a row that is not there",
             "nothing of the energy",
+            "a metric of its own",
+            "a question",
             "a panic",
         ];
         let lie = lies
@@ -250,6 +252,12 @@ impl Material for Liar {
                 .filter(|l| !l.contains("energy"))
                 .map(|l| format!("{l}\n"))
                 .collect(),
+            "a metric of its own" => text + "store metric 0 1\n",
+            "a question" => text.replacen(
+                "store stress 0",
+                "call law membrane\nresult stress 1\nq = result law stress 0\nstore stress 0 q #",
+                1,
+            ),
             "a panic" => panic!("it fell over"),
             _ => text,
         }))
@@ -288,6 +296,10 @@ fn a_tape_that_is_not_what_the_law_does_is_found_out() {
     assert!(told.ends_with("'metric' has 3 rows"), "{told}");
     let (_, told) = of("nothing of the energy");
     assert_eq!(told, "it does not write 'energy'");
+    let (_, told) = of("a metric of its own");
+    assert_eq!(told, "it writes 'metric', which its function does not");
+    let (_, told) = of("a question");
+    assert_eq!(told, "it calls 'membrane', as elements alone do");
     let (_, told) = of("a panic");
     assert_eq!(
         told,

@@ -225,10 +225,14 @@ impl Recording {
 
     fn buffer(&mut self, name: &str, rows: usize, uniform: bool) -> u16 {
         self.names.push(name.to_owned());
-        with_open(|o| o.builder.buffer(name, rows as u16, uniform))
+        let rows = u16::try_from(rows).expect("at most 65,535 rows");
+        with_open(|o| o.builder.buffer(name, rows, uniform))
     }
 
     /// A buffer `[rows][8]` that the function reads.
+    ///
+    /// # Panics
+    /// With more than 65,535 rows.
     pub fn input(&mut self, name: &str, rows: usize) -> Aligned {
         let buffer = self.buffer(name, rows, false);
         let mut memory = Aligned::zeros(rows * WIDTH);
@@ -256,6 +260,9 @@ impl Recording {
     ///
     /// # Errors
     /// When a row was not written, or with something that was computed outside of lanes.
+    ///
+    /// # Panics
+    /// With more than 65,535 rows.
     pub fn output(&mut self, name: &str, memory: &[f64]) -> Result<(), String> {
         let known = self.names.iter().position(|n| n == name);
         let buffer = match known {
@@ -419,6 +426,9 @@ pub fn forces(element: &impl Element, material: MaterialSizes) -> Result<Tape, S
 ///
 /// # Errors
 /// When it computes outside of lanes, or refuses.
+///
+/// # Panics
+/// When it has no patch part.
 pub fn patch_forces(
     element: &impl Element,
     material: MaterialSizes,

@@ -15,6 +15,13 @@ impl fmt::Display for Fault {
 
 impl std::error::Error for Fault {}
 
+/// Whether a name can stand in C as well: a letter, then letters, digits and `_`, at most 32.
+pub(crate) fn is_identifier(name: &str) -> bool {
+    let letters = name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_');
+    let first = name.bytes().next().is_some_and(|b| b.is_ascii_alphabetic());
+    letters && first && name.len() <= 32
+}
+
 impl Tape {
     /// Whether it can be run, put into another one and written as source.
     ///
@@ -50,9 +57,7 @@ impl Tape {
     fn check_names(&self) -> Result<(), Fault> {
         for (i, buffer) in self.buffers.iter().enumerate() {
             let name = &buffer.name;
-            let letters = name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_');
-            let first = name.bytes().next().is_some_and(|b| b.is_ascii_alphabetic());
-            if !(letters && first && name.len() <= 32) {
+            if !is_identifier(name) {
                 return Err(Fault(format!(
                     "buffer {i}: {name:?} is no name (a letter, then letters, digits and '_', at most 32)"
                 )));

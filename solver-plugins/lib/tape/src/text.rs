@@ -29,7 +29,7 @@
 //! | `store BUFFER ROW A` | |
 
 use crate::build::Builder;
-use crate::check::Fault;
+use crate::check::{Fault, is_identifier};
 use crate::form::{COLUMNS, Call, Id, Kind, Operation, Row, Tape};
 use std::collections::HashMap;
 use std::fmt::{self, Write};
@@ -267,9 +267,15 @@ fn short(word: &str) -> String {
     }
 }
 
-fn named(word: &str) -> bool {
-    let letters = word.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_');
-    letters && word.bytes().next().is_some_and(|b| b.is_ascii_alphabetic())
+/// Whether a word may name something: all that messages repeat of a tape.
+fn is_name(word: &str) -> Result<(), String> {
+    if is_identifier(word) {
+        return Ok(());
+    }
+    Err(format!(
+        "'{}' is no name (a letter, then letters, digits and '_', at most 32)",
+        short(word)
+    ))
 }
 
 fn read_number(word: &str) -> Option<f64> {
@@ -301,6 +307,7 @@ impl<'t> Reader<'t> {
             ["call", name, of] => {
                 self.new_name(name)?;
                 room(self.calls.len(), "calls")?;
+                is_name(of)?;
                 let of = of.to_owned();
                 let (arguments, results) = (Vec::new(), Vec::new());
                 self.calls.push((
@@ -314,12 +321,14 @@ impl<'t> Reader<'t> {
                 Ok(())
             }
             ["argument", name, ref ids @ ..] => {
+                is_name(name)?;
                 let ids: Result<Vec<Id>, String> = ids.iter().map(|w| self.number(w)).collect();
                 let ids = ids?;
                 self.open_call()?.arguments.push((name.to_owned(), ids));
                 Ok(())
             }
             ["result", name, rows] => {
+                is_name(name)?;
                 let rows = whole(rows, "number of rows")?;
                 self.open_call()?.results.push((name.to_owned(), rows));
                 Ok(())
@@ -345,12 +354,7 @@ impl<'t> Reader<'t> {
     }
 
     fn new_name(&self, name: &str) -> Result<(), String> {
-        if !named(name) {
-            return Err(format!(
-                "'{}' is no name (a letter, then letters, digits and '_')",
-                short(name)
-            ));
-        }
+        is_name(name)?;
         let taken = self.values.contains_key(name)
             || self.tables.iter().any(|t| t.0 == name)
             || self.calls.iter().any(|c| c.0 == name);
@@ -363,6 +367,7 @@ impl<'t> Reader<'t> {
 
     fn buffer(&mut self, name: &'t str, rows: &str, uniform: bool) -> Result<(), String> {
         room(self.buffers.len(), "buffers")?;
+        is_name(name)?;
         let index = self
             .builder
             .buffer(name, whole(rows, "number of rows")?, uniform);

@@ -330,6 +330,10 @@ fn what_a_person_writes_is_read_and_what_is_wrong_is_named_with_its_line() {
         fault("c = least half 10", "c = add nan inf"),
         "line 8: 'nan' is no number, nor the name of one before"
     );
+    assert_eq!(
+        fault("c = least half 10", "call law \u{1b}[31m"),
+        "line 8: '?[31m' is no name (a letter, then letters, digits and '_', at most 32)"
+    );
     let long = fault(
         "c = least half 10",
         &format!("c = least half {}", "x".repeat(5000)),
