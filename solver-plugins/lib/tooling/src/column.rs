@@ -41,7 +41,7 @@ fn sum(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
 
 impl ToolMesh {
     /// Of what lies over `base` (m) and under an opening, a rectangle in plan (m): its area (m2) at `base`, and its volume (m3). The tool is closed, or
-    /// open only at a foot that lies no higher than `base`.
+    /// open only at a foot that lies no higher than `base`. What lies in several bodies counts once, as in [`ToolMesh::volume`].
     pub fn column(&self, opening: Rectangle, base: f64) -> [f64; 2] {
         let sides = |polygon: Vec<Vec3>| {
             (0..2).fold(polygon, |kept, d| {
@@ -53,7 +53,9 @@ impl ToolMesh {
             let corners = triangle.map(|n| self.points[n as usize]);
             under(&clipped(&sides(corners.to_vec()), |p| p[2] - base), base)
         };
-        self.triangles.iter().map(of).fold([0.0; 2], sum)
+        let [area, volume] = self.triangles.iter().map(of).fold([0.0; 2], sum);
+        let again = self.counted_again(opening, base);
+        [area - again[0], volume - again[1]]
     }
 }
 

@@ -22,6 +22,7 @@ mod input;
 mod mesh;
 #[cfg(feature = "steps")]
 pub mod of_step;
+mod overlap;
 pub mod part;
 pub mod sdf;
 mod stl;

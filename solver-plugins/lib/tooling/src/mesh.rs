@@ -46,11 +46,14 @@ impl ToolMesh {
             .sum()
     }
 
-    /// Enclosed volume (m3), negative when the facets point inwards. Meaningful for closed surfaces.
+    /// Enclosed volume (m3), negative when the facets point inwards. Meaningful for closed surfaces. What lies in several bodies counts once, to
+    /// within some thousandths of it.
     pub fn volume(&self) -> f64 {
-        (0..self.triangles.len())
-            .map(|t| dot(self.corners(t)[0], self.area_normal(t)) / 6.0)
-            .sum()
+        let of = |t| dot(self.corners(t)[0], self.area_normal(t)) / 6.0;
+        let sum: f64 = (0..self.triangles.len()).map(of).sum();
+        let [low, high] = self.bounds();
+        let [_, again] = self.counted_again([low[0], low[1], high[0], high[1]], low[2]);
+        sum - again
     }
 
     /// Lowest and highest coordinates. Both zero for an empty mesh.
