@@ -166,9 +166,24 @@ pub struct Sheet {
     /// Plies: places with another friction, or without stitches.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub regions: Vec<PlyRegion>,
+    /// Plies on another ply: tied to it, as by stitches through both; what lies on it as laid neither slides on it nor comes off it.
+    #[serde(default, skip_serializing_if = "is_off")]
+    pub tied: bool,
+}
+
+/// Whether a word that is left out by default has its default.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
+fn is_off(given: &bool) -> bool {
+    !*given
 }
 
 impl Sheet {
+    /// The names of the sheets that are tied, each with that of the ply below it, to which it is.
+    pub fn ties(sheets: &[Self]) -> impl Iterator<Item = (&str, &str)> {
+        let tied = sheets.windows(2).filter(|two| two[1].tied);
+        tied.map(|two| (two[1].name.as_str(), two[0].name.as_str()))
+    }
+
     /// The region of a sheet with an `outline`, over the tool; `None` for a sheet without one.
     ///
     /// # Errors

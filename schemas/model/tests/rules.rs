@@ -152,6 +152,29 @@ fn under_one_film_no_more_is_drawn_than_there_is_and_its_frame_ends_on_the_bed_o
 }
 
 #[test]
+fn only_on_another_ply_a_ply_is_tied() {
+    let tied = |k: usize| bag(|s| s["sheets"][k]["tied"] = json!(true));
+    assert_eq!(refused(tied(2)), Ok(()));
+    assert_refused(
+        tied(1),
+        Rule::Stack,
+        &["sheets[1].tied", "lies on the diaphragm"],
+    );
+    assert_refused(
+        tied(0),
+        Rule::Size,
+        &["sheets[0].tied", "a diaphragm has no `tied`"],
+    );
+    // In a press the first ply has nothing below it.
+    let lowest = press(|s| s["sheets"][0]["tied"] = json!(true));
+    assert_refused(
+        lowest,
+        Rule::Stack,
+        &["sheets[0].tied", "no sheet lies below"],
+    );
+}
+
+#[test]
 fn a_bag_without_pressure_forms_nothing() {
     for name in ["bag_pressure", "forming_pressure"] {
         let none = bag(|s| s["process"]["double_diaphragm"][name] = json!("0 bar"));

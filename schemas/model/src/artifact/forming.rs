@@ -155,6 +155,9 @@ pub struct Sheet {
     /// Where it rubs otherwise, or has no stitches.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub regions: Vec<RegionFacts>,
+    /// The ply below it that it is tied to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tied_to: Option<String>,
     /// Of a mesh that was fitted to an outline.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mesh_quality: Option<MeshQuality>,
@@ -190,6 +193,7 @@ impl Sheet {
             outline: None,
             holes: Vec::new(),
             regions: Vec::new(),
+            tied_to: None,
             mesh_quality: None,
             start: None,
             net_nodes: None,

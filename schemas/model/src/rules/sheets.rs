@@ -32,6 +32,7 @@ pub fn check(known: &Known<'_>) -> Vec<Fault> {
         match sheet.kind {
             SheetKind::Ply => {
                 size(sheet, &at, &mut found);
+                found.extend(tied(known, k, sheet, &at));
                 match &sheet.fibre_1 {
                     FibreDirection::Straight(_) => found.extend(fibres(sheet, at.key("fibre_2"))),
                     FibreDirection::Steered(s) => found.extend(steering::check(sheet, s, &at)),
@@ -69,6 +70,7 @@ fn diaphragm(sheet: &Sheet, at: &Path, found: &mut Vec<Fault>) {
         ("fibre_1", sheet.fibre_1 != FibreDirection::default()),
         ("fibre_2", sheet.fibre_2.is_some()),
         ("regions", !sheet.regions.is_empty()),
+        ("tied", sheet.tied),
     ] {
         if given {
             let fault = Fault::text(
@@ -81,6 +83,26 @@ fn diaphragm(sheet: &Sheet, at: &Path, found: &mut Vec<Fault>) {
             ));
         }
     }
+}
+
+/// Only on another ply a ply is tied.
+fn tied(known: &Known<'_>, k: usize, sheet: &Sheet, at: &Path) -> Option<Fault> {
+    let below = k.checked_sub(1).map(|below| known.sheets[below]);
+    // A sheet below that could not be read is told by itself.
+    if !sheet.tied || matches!(below, Some(None)) {
+        return None;
+    }
+    let text = match below.flatten() {
+        Some(below) if below.kind == SheetKind::Ply => return None,
+        Some(below) => format!("`{}` lies on the diaphragm `{}`", sheet.name, below.name),
+        None => format!("no sheet lies below `{}`", sheet.name),
+    };
+    let fault = Fault::text(Rule::Stack, at.key("tied"), text).shown(Shown::Key);
+    Some(
+        fault.expected(
+            "a ply below it, to which it is tied: sheets are listed from the tool upwards",
+        ),
+    )
 }
 
 fn size(sheet: &Sheet, at: &Path, found: &mut Vec<Fault>) {

@@ -5,7 +5,7 @@ mod common;
 use plyflow_geometry::vec3::Vec3;
 use plyflow_mechanics::archive::Archive;
 use plyflow_mechanics::contact::{
-    ContactSettings, Plane, RigidContact, RigidItem, SheetContact, SlaveItem,
+    ContactSettings, Plane, RigidContact, RigidItem, SheetContact, SlaveItem, Tie, Ties,
 };
 use plyflow_mechanics::mesh::{QuadMesh, even_axis};
 use plyflow_mechanics::model::{Drive, Model, Pressures, StepSettings};
@@ -70,9 +70,13 @@ fn pressed_stack() -> Model {
         let xi = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]][at];
         SlaveItem::new(n + k, cell as u32, xi)
     };
-    let slaves = (0..n).map(corner).collect();
+    let slaves: Vec<SlaveItem> = (0..n).map(corner).collect();
+    // Some of them are stitched on, not too many to slide.
+    let tied = slaves.iter().step_by(17);
+    let ties = tied.map(|s| Tie::new(s.node, s.cell, s.xi)).collect();
     let name = "sheet 1 on sheet 0".into();
-    let on_sheet = SheetContact::new(name, 1.0, THICKNESS, 0.3, &contact, slaves);
+    let mut on_sheet = SheetContact::new(name, 1.0, THICKNESS, 0.3, &contact, slaves);
+    on_sheet.ties = Ties::new(ties);
     model.add_sheet_contact(on_sheet);
     model.set_contact_stiffness(&contact);
     model.set_pressures(Pressures {

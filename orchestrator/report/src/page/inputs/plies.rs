@@ -52,14 +52,21 @@ pub(super) fn sketches(sheets: &[Sheet]) -> Markup {
     for sheet in sheets.iter().filter(|s| s.is_ply() && s.outline.is_some()) {
         let alike = |(s, _): &&mut (&Sheet, Vec<&str>)| {
             let flat = |s: &Sheet| (s.fibre_1, s.fibre_2);
-            (&s.outline, &s.holes, &s.regions, &s.steering, flat(s))
-                == (
-                    &sheet.outline,
-                    &sheet.holes,
-                    &sheet.regions,
-                    &sheet.steering,
-                    flat(sheet),
-                )
+            (
+                &s.outline,
+                &s.holes,
+                &s.regions,
+                &s.tied_to,
+                &s.steering,
+                flat(s),
+            ) == (
+                &sheet.outline,
+                &sheet.holes,
+                &sheet.regions,
+                &sheet.tied_to,
+                &sheet.steering,
+                flat(sheet),
+            )
         };
         match all.iter_mut().find(alike) {
             Some((_, names)) => names.push(&sheet.name),
@@ -129,7 +136,7 @@ fn sketch(sheet: &Sheet, names: &[&str], scale: f64) -> Markup {
                 }
                 (dimensions([left, top, w, h], b))
             }
-            figcaption { (names.join(", ")) @for r in &sheet.regions { "; " (r.name) ": " (region_text(r)) } }
+            figcaption { (names.join(", ")) @if let Some(below) = &sheet.tied_to { ", tied to " (below) } @for r in &sheet.regions { "; " (r.name) ": " (region_text(r)) } }
         }
     }
 }

@@ -21,6 +21,7 @@ mod rigid;
 mod search;
 mod sheets;
 mod slave;
+mod ties;
 
 pub use closest::{Surface, shape};
 pub(crate) use folds::Bearing;
@@ -36,3 +37,4 @@ pub use rigid::{OpenPlate, Plane, RigidContact, RigidItem, RigidMotion, RigidSur
 pub use sheets::SheetContact;
 pub use slave::SlaveItem;
 pub(crate) use slave::WHOLE;
+pub use ties::{SLACK, Tie, Ties};

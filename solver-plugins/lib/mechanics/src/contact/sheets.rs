@@ -18,6 +18,7 @@ use super::search::track;
 use super::slave::{
     Law, SEARCH_INTERVAL, SlaveItem, held_gap, hold, relative_speed, scatter, touch,
 };
+use super::ties::Ties;
 use crate::archive::{Archive, ArchiveError};
 use crate::mesh::NONE;
 use crate::vec3::{Vec3, add, dot, norm, scale, sub, unit};
@@ -59,6 +60,8 @@ pub struct SheetContact {
     pub rim: Vec<u32>,
     /// The slaves.
     pub items: Vec<SlaveItem>,
+    /// Those of its nodes that are tied to the master besides.
+    pub ties: Ties,
     /// By slave: call of [`SheetContact::compute`] before which it cannot touch. Apart from the items, so that to pass over one
     /// that sleeps touches four bytes and not some cache lines.
     wakes: Vec<u32>,
@@ -91,6 +94,7 @@ impl SheetContact {
             counted: 1.0,
             rim: Vec::new(),
             items,
+            ties: Ties::default(),
             wakes: Vec::new(),
             spans: Vec::new(),
             cycle: 0,
@@ -159,7 +163,9 @@ impl SheetContact {
             law,
         };
         self.cycle += 1;
+        let tied = self.ties.compute(s, v, pace.dt, side * self.offset);
         if let Some(f) = onto {
+            self.ties.scatter(s.cells, f);
             let items = self.items.chunks_mut(SPAN);
             let wakes = self.wakes.chunks_mut(SPAN);
             for ((items, wakes), span) in items.zip(wakes).zip(&mut self.spans) {
@@ -180,6 +186,7 @@ impl SheetContact {
         for span in self.spans.iter().filter(|s| s.touches) {
             total.add(&span.energy);
         }
+        total.add(&tied);
         total
     }
 
@@ -212,6 +219,7 @@ impl SheetContact {
 
     /// Adds the forces to `f` (N), slaves and masters, in the order of the items.
     pub fn scatter(&self, cells: &[[u32; 4]], f: &mut [Vec3]) {
+        self.ties.scatter(cells, f);
         for (items, span) in self.items.chunks(SPAN).zip(&self.spans) {
             if span.touches {
                 scatter(items.iter(), cells, f);
@@ -225,7 +233,8 @@ impl SheetContact {
         a.value(&mut self.ledge)?;
         a.value(&mut self.wakes)?;
         a.value(&mut self.spans)?;
-        a.values(&mut self.items)
+        a.values(&mut self.items)?;
+        a.values(&mut self.ties.items)
     }
 }
 

@@ -3,7 +3,7 @@
 use super::mirror::Mirroring;
 use super::parts::Model;
 use crate::contact::{
-    ContactSettings, FoldSpec, SelfContact, SheetContact, WHOLE, ledge, rim_height,
+    ContactSettings, FoldSpec, SelfContact, SheetContact, Tie, WHOLE, ledge, rim_height, shape,
 };
 use crate::mesh::NONE;
 use std::ops::Range;
@@ -54,7 +54,35 @@ impl Masses<'_> {
                 row[*n as usize] += counted * item.weights()[k] * item.stiffness;
             }
         }
+        for tie in &mut contact.ties.items {
+            let nodes = cells[tie.cell as usize];
+            tie.stiffness = c.stiffness_factor * self.reduced(tie.node, nodes) / dt2;
+            add_to_row(tie, nodes, tie.stiffness, row);
+        }
     }
+
+    /// Bounds the stiffness of a tie, and sets its damping.
+    fn limit(&self, tie: &mut Tie, cells: &[[u32; 4]], c: &ContactSettings, limit: &[f64]) {
+        let nodes = cells[tie.cell as usize];
+        let stiffness = tie.stiffness * limit_of(tie, nodes, limit);
+        let damping = 2.0 * c.damping_ratio * (stiffness * self.reduced(tie.node, nodes)).sqrt();
+        // As weak as those of slip: along the fibres elements leave little of the bound.
+        (tie.stiffness, tie.damping) = (c.slip_factor * stiffness, c.slip_factor * damping);
+    }
+}
+
+/// Adds what a tie has of something to the `row` of each node that it acts on.
+fn add_to_row(tie: &Tie, nodes: [u32; 4], of_it: f64, row: &mut [f64]) {
+    row[tie.node as usize] += of_it;
+    for (w, n) in shape(tie.xi).iter().zip(nodes) {
+        row[n as usize] += w * of_it;
+    }
+}
+
+/// The least limit of the nodes that a tie acts on.
+fn limit_of(tie: &Tie, nodes: [u32; 4], limit: &[f64]) -> f64 {
+    let least = nodes.iter().map(|n| limit[*n as usize]).fold(1.0, f64::min);
+    least.min(limit[tie.node as usize])
 }
 
 /// From which depth on a contact is deep, and how high the ledge at the rim of its master is, from the sheets' `thickness` by node (m).
@@ -92,12 +120,7 @@ impl Model {
         let augmentation = c
             .augmentation
             .min(c.largest_augmentation(self.mass_ratio()));
-        let mut thickness = vec![f64::INFINITY; masses.mass.len()];
-        for sheet in &self.topology.sheets {
-            for node in &sheet.nodes {
-                thickness[*node as usize] = sheet.thickness;
-            }
-        }
+        let thickness = self.thickness_by_node();
         let heights = self.rim_heights();
         let mut row = vec![0.0; masses.mass.len()];
         for contact in &mut self.contacts.rigid {
@@ -137,8 +160,25 @@ impl Model {
             let reduced = masses.reduced(item.node, nodes);
             item.damping = 2.0 * c.damping_ratio * (item.stiffness * reduced).sqrt();
         }
+        let ties = self
+            .contacts
+            .sheets
+            .iter_mut()
+            .flat_map(|c| &mut c.ties.items);
+        ties.for_each(|tie| masses.limit(tie, cells, c, &limit));
         self.bound_contact_damping();
         self.set_contact_room();
+    }
+
+    /// Thickness (m) of the sheet of each node.
+    fn thickness_by_node(&self) -> Vec<f64> {
+        let mut thickness = vec![f64::INFINITY; self.topology.mass.len()];
+        for sheet in &self.topology.sheets {
+            for node in &sheet.nodes {
+                thickness[*node as usize] = sheet.thickness;
+            }
+        }
+        thickness
     }
 
     /// By sheet, its cells and how long (m) those at its rim are across it ([`rim_height`]).
@@ -196,6 +236,10 @@ impl Model {
                     row[*n as usize] += item.weights()[k] * damping;
                 }
             }
+            for tie in &contact.ties.items {
+                let nodes = self.topology.cells[tie.cell as usize];
+                add_to_row(tie, nodes, 2.0 * tie.damping, &mut row);
+            }
         }
         let of = row.iter().zip(&self.topology.mass);
         let limit: Vec<f64> = of
@@ -210,6 +254,10 @@ impl Model {
             let nodes = self.topology.cells[item.cell as usize];
             let least = nodes.iter().map(|n| limit[*n as usize]).fold(1.0, f64::min);
             item.damping *= least.min(limit[item.node as usize]);
+        }
+        for tie in (self.contacts.sheets.iter_mut()).flat_map(|c| &mut c.ties.items) {
+            let nodes = self.topology.cells[tie.cell as usize];
+            tie.damping *= limit_of(tie, nodes, &limit);
         }
     }
 
@@ -248,6 +296,10 @@ impl Model {
                 {
                     used[n as usize] += w.max(0.0) * stiffness;
                 }
+            }
+            for tie in &contact.ties.items {
+                let nodes = self.topology.cells[tie.cell as usize];
+                add_to_row(tie, nodes, tie.stiffness, &mut used);
             }
         }
         let left = |(u, m): (&f64, &f64)| (0.7 * m / dt2 - u).max(0.1 * m / dt2);

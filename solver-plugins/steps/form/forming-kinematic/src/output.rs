@@ -353,6 +353,12 @@ fn warnings(p: &Parameters, d: &Done, unreached: usize) -> Vec<String> {
             "ply '{name}': its `regions` count for nothing here: a pin-jointed net knows neither friction nor stitches; forming-explicit computes them"
         ));
     }
+    if d.ply.scene.tied {
+        texts.push(format!(
+            "ply '{name}': it is tied to the ply below it, and its net does not know: each ply is draped by itself, so that the two may slide and shear \
+             apart; forming-explicit computes ties"
+        ));
+    }
     let poor = d.quality.and_then(|q| q.warning());
     texts.extend(poor.map(|text| format!("ply '{name}': {text}")));
     if unreached == 0 {

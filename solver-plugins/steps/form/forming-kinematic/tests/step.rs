@@ -474,6 +474,22 @@ fn regions_of_a_ply_are_said_to_count_for_nothing_in_a_net() {
     assert_eq!(formed.attributes["warnings"].as_array().unwrap().len(), 1);
 }
 
+#[test]
+fn a_net_of_a_tied_ply_says_that_it_does_not_know_of_the_one_below() {
+    let mut scene = scene(hemisphere(), [0.08, 0.08], [0.0, 90.0]);
+    let mut upper = scene["sheets"][1].clone();
+    upper["name"] = json!("second");
+    upper["tied"] = json!(true);
+    scene["sheets"].as_array_mut().unwrap().insert(2, upper);
+    let formed = on_hemisphere(0.08, json!({"scene": scene})).unwrap();
+    let warnings = formed.attributes["warnings"].as_array().unwrap();
+    let of_ties: Vec<_> = (warnings.iter().filter_map(|w| w.as_str()))
+        .filter(|w| w.contains("tied to the ply below"))
+        .collect();
+    assert_eq!(of_ties.len(), 1, "{warnings:?}");
+    assert!(of_ties[0].starts_with("ply 'second'"), "{of_ties:?}");
+}
+
 /// Facets of a block of 140 x 140 x 10 mm and of half a sphere of 40 mm on it, each closed, in mm.
 fn block_and_dome() -> [Vec<[[f64; 3]; 3]>; 2] {
     let corner = |k: usize| {

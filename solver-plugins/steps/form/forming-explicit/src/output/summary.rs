@@ -4,14 +4,14 @@ use crate::course::Outcome;
 use crate::error::Result;
 use crate::forming::Forming;
 use crate::measure::{
-    OVERLAP_BOUND, OVERLAP_PEAK_BOUND, Penetration, PenetrationPeak, ply_strains,
+    OVERLAP_BOUND, OVERLAP_PEAK_BOUND, Penetration, PenetrationPeak, ply_strains, tie_stretch,
 };
 use crate::output::warnings::warnings;
 use crate::request::Parameters;
 use crate::stack::{RigidName, regions, sheet, symmetry};
 use crate::watch::{DEPTH_BOUND, Kind, PairDepth, depth_attributes};
 use plyflow_model::artifact::{self, MeshQuality};
-use plyflow_model::scene::SheetKind;
+use plyflow_model::scene::{Sheet, SheetKind};
 use plyflow_sdk::{Host, Log};
 use plyflow_tooling::FieldError;
 use std::collections::BTreeMap;
@@ -32,6 +32,9 @@ fn sheet_attributes(forming: &Forming, p: &Parameters) -> Vec<artifact::Sheet> {
                 added_mass: Some(added),
                 element: Some(choice.plugin.clone()),
                 regions: regions::attributes(&s.scene),
+                tied_to: Sheet::ties(&p.scene.sheets)
+                    .find(|(name, _)| *name == s.scene.name)
+                    .map(|(_, below)| below.to_owned()),
                 mesh_quality: body.quality,
                 ..artifact::Sheet::new(&body.name, s.scene.kind, s.thickness, s.offset)
             };
@@ -140,7 +143,7 @@ pub fn write_summary(
         host.log(Log::Warn, w);
     }
     host.write_attributes(&attributes)?;
-    write_health(host, outcome, &penetrations)?;
+    write_health(host, forming, outcome, &penetrations)?;
     let errors = forming.field_errors.iter().map(|(_, e)| e.largest);
     host.result("tool_field_error", errors.fold(0.0, f64::max), "m")?;
     write_shape(host, forming)?;
@@ -173,7 +176,12 @@ fn write_cost(host: &Host, forming: &Forming, outcome: &Outcome, rate: f64) -> R
 }
 
 /// How far to trust the run: energies and penetrations.
-fn write_health(host: &Host, outcome: &Outcome, now: &[Penetration]) -> Result<()> {
+fn write_health(
+    host: &Host,
+    forming: &Forming,
+    outcome: &Outcome,
+    now: &[Penetration],
+) -> Result<()> {
     let h = &outcome.health;
     let worst = |f: fn(&Penetration) -> f64| now.iter().map(f).fold(0.0, f64::max);
     let peak = |f: fn(&Penetration, &PenetrationPeak) -> f64| {
@@ -214,6 +222,9 @@ fn write_health(host: &Host, outcome: &Outcome, now: &[Penetration]) -> Result<(
     for (name, kind) in [("edge_depth", Kind::Edges), ("film_hang", Kind::Hangs)] {
         let ends = outcome.depths.iter().filter(of(kind)).map(|d| d.end.depth);
         host.result(name, ends.fold(0.0, f64::max), "m")?;
+    }
+    if let Some([stretch, _]) = tie_stretch(forming) {
+        host.result("tie_stretch", stretch, "m")?;
     }
     Ok(())
 }

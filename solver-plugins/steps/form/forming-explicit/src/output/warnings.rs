@@ -3,7 +3,7 @@
 use crate::course::Outcome;
 use crate::forming::Forming;
 use crate::load::{PressLoad, StampingLoad};
-use crate::measure::{Penetration, ply_strains, too_deep_on_the_way};
+use crate::measure::{Penetration, ply_strains, tie_stretch, too_deep_on_the_way};
 use crate::request::Parameters;
 use crate::stack::{Body, StackSheet};
 use crate::watch::depth_warnings;
@@ -57,6 +57,9 @@ fn unlike_films(forming: &Forming) -> Option<String> {
 /// Strain of the fibres of plies beyond which the run warns (thesis 3.4.1).
 const LARGEST_FIBRE_STRAIN: f64 = 0.01;
 
+/// How far (over the length of an element) ties may give way without a word: what plies slide by is seen to within an element's length.
+const TIES_GIVE: f64 = 0.1;
+
 /// All that a user should know of a run that came to its end.
 pub fn warnings(forming: &Forming, outcome: &Outcome, now: &[Penetration]) -> Vec<String> {
     let mut warnings = mesh_warnings(forming);
@@ -65,6 +68,7 @@ pub fn warnings(forming: &Forming, outcome: &Outcome, now: &[Penetration]) -> Ve
     warnings.extend(depth_warnings(&outcome.depths));
     warnings.extend(now.iter().filter_map(Penetration::too_deep));
     warnings.extend(too_deep_on_the_way(now, &outcome.peaks));
+    warnings.extend(stretched_ties(forming));
     let strain = ply_strains(forming).fibre;
     if strain > LARGEST_FIBRE_STRAIN {
         warnings.push(format!(
@@ -84,6 +88,19 @@ pub fn warnings(forming: &Forming, outcome: &Outcome, now: &[Penetration]) -> Ve
         );
     }
     warnings
+}
+
+/// Ties are springs: what they give way by is told where it counts.
+fn stretched_ties(forming: &Forming) -> Option<String> {
+    let [stretch, share] = tie_stretch(forming)?;
+    (share > TIES_GIVE).then(|| {
+        format!(
+            "a node of tied plies is {:.2} mm from the point that it was laid on, {:.0} % of an element: ties are springs, which the step allows to be only so \
+             stiff. Take a smaller `time_step`: with half of it they are four times as stiff",
+            1e3 * stretch,
+            100.0 * share
+        )
+    })
 }
 
 /// What to tell where contacts' multipliers grow more slowly than asked for.

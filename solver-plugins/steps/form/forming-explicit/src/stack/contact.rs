@@ -7,9 +7,9 @@ use crate::stack::locate::locate;
 use crate::stack::place::{Layer, StackPlace};
 use crate::stack::rim::crooked_rim;
 use crate::stack::sheet::StackSheet;
-use plyflow_mechanics::contact::{FoldSpec, FrictionLaw, SheetContact};
+use plyflow_mechanics::contact::{FoldSpec, FrictionLaw, SheetContact, SlaveItem, Tie, Ties};
 use plyflow_mechanics::model::Model;
-use plyflow_model::scene::SheetKind;
+use plyflow_model::scene::{Sheet, SheetKind};
 
 /// Least distance of the mid-surfaces of two bare films in contact (m). They are 0.08 mm thick; at so small a
 /// distance the direction from one film's facets to the other's nodes turns by a large angle over a few
@@ -91,9 +91,18 @@ impl<'a> StackContacts<'a> {
             slave: self.name(slave.place),
         };
         let friction = self.friction.law(model, &touching)?;
-        let contact = self.on_sheet(model, slave, master, side, friction);
+        let mut contact = self.on_sheet(model, slave, master, side, friction);
+        if self.is_tied(slave.place, master.place) {
+            let laid = contact.items.iter().filter(|item| lies_on(model, item));
+            contact.ties = Ties::new(laid.map(|i| Tie::new(i.node, i.cell, i.xi)).collect());
+        }
         model.add_sheet_contact(contact);
         Ok(())
+    }
+
+    /// Whether a sheet is tied to another. A zone may lack the one below it in the scene.
+    fn is_tied(&self, upper: StackPlace, lower: StackPlace) -> bool {
+        Sheet::ties(&self.p.scene.sheets).any(|two| two == (self.name(upper), self.name(lower)))
     }
 
     /// Adds the contact of a ply with itself, unless `self_contact` is off. Where the scene has no coefficient for fabric on fabric it
@@ -129,4 +138,20 @@ impl<'a> StackContacts<'a> {
         model.add_self_contact(spec, &self.p.contact_settings());
         Ok(())
     }
+}
+
+/// Whether a node lies over the place in its cell that it has been given, in plan: one beyond the master's rim has been given the nearest cell.
+fn lies_on(model: &Model, item: &SlaveItem) -> bool {
+    let x = model.x();
+    let corners = model.cells()[item.cell as usize].map(|n| x[n as usize]);
+    let off = |d: usize| {
+        let place: f64 = item
+            .weights()
+            .iter()
+            .zip(corners)
+            .map(|(w, p)| w * p[d])
+            .sum();
+        (x[item.node as usize][d] - place).abs()
+    };
+    off(0) + off(1) < 1e-9
 }

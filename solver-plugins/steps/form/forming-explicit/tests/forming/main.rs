@@ -22,6 +22,7 @@ mod stamping;
 mod steered;
 mod symmetry;
 mod taken_up;
+mod ties;
 mod tools;
 mod unstable;
 mod watch;
