@@ -393,6 +393,10 @@ impl Filler<'_> {
             "fibre_2",
             text(turned(&row.angle.text, row.angle.si, FRAC_PI_2), &at),
         );
+        if let Some((tied, at)) = &row.tied {
+            let (kind, span) = (Kind::Bool(*tied), moved(at, of.base));
+            add("tied", Node { kind, span });
+        }
         Some(Node {
             kind: Kind::Map(entries),
             span,

@@ -8,10 +8,10 @@ use plyflow_workflow::resolve;
 const PLY: &str = "  - name: ply-1\n    kind: ply\n    material: materials/fabric.yaml\n    length: 480 mm\n    width: 300 mm\n    fibre_1: 45 deg\n    fibre_2: -45 deg\n";
 
 const BOOK: &str = "# the layup
-name,material,angle,outline,layer,x [mm],y [mm],rotation,note
-ply-1,fabric,45,skin.dxf,PLY,10,-5,,first
-ply-2,../materials/fabric.yaml,-45 deg,cap.csv,,,1 cm,90,
-ply-3,,0,,,12.5,,,\"a, b\"
+name,material,angle,outline,layer,x [mm],y [mm],rotation,tied,note
+ply-1,fabric,45,skin.dxf,PLY,10,-5,,,first
+ply-2,../materials/fabric.yaml,-45 deg,cap.csv,,,1 cm,90,yes,
+ply-3,,0,,,12.5,,,,\"a, b\"
 ";
 
 const ENTRY: &str = "  - plies:
@@ -38,6 +38,7 @@ const LISTED: &str = "  - name: ply-1
     centre: [0 mm, 10 mm]
     fibre_1: -45 deg
     fibre_2: 45 deg
+    tied: true
   - name: ply-3
     kind: ply
     material: {file: materials/fabric.yaml, with: {shear: 90 N/m}}
@@ -195,7 +196,7 @@ fn what_is_wrong_in_a_book_is_told_in_its_line_and_column() {
             "layup/plies.csv",
             "note",
             "colour",
-            "plies.csv:2:58: there is no column `colour`",
+            "plies.csv:2:63: there is no column `colour`",
         ),
         (
             "layup/plies.csv",

@@ -16,12 +16,13 @@ const LAYER: usize = 4;
 const X: usize = 5;
 const Y: usize = 6;
 const ROTATION: usize = 7;
+const TIED: usize = 8;
 
 const fn column(names: &'static [&'static str], of: Option<Dimension>, needed: bool) -> Known {
     Known { names, of, needed }
 }
 
-const COLUMNS: [Known; 8] = [
+const COLUMNS: [Known; 9] = [
     column(&["name", "ply"], None, true),
     column(&["angle", "orientation"], Some(Dimension::Angle), true),
     column(&["material"], None, false),
@@ -30,6 +31,15 @@ const COLUMNS: [Known; 8] = [
     column(&["x"], Some(Dimension::Length), false),
     column(&["y"], Some(Dimension::Length), false),
     column(&["rotation"], Some(Dimension::Angle), false),
+    column(&["tied"], None, false),
+];
+
+/// What a cell of `tied` may say.
+const ANSWERS: [(&str, bool); 4] = [
+    ("yes", true),
+    ("no", false),
+    ("true", true),
+    ("false", false),
 ];
 
 /// A row of a book.
@@ -49,6 +59,8 @@ pub struct Row {
     pub place: [Option<Amount>; 2],
     /// By how much the outline is turned about its (0, 0), counter-clockwise seen from above. The fibres are not turned with it.
     pub rotation: Option<Amount>,
+    /// Whether it is tied to the ply below it, and where that stands; `None`: the row does not say.
+    pub tied: Option<(bool, Range<usize>)>,
     /// All of the row.
     pub span: Range<usize>,
 }
@@ -77,6 +89,7 @@ pub fn read(text: &str) -> Result<Book, Vec<Flaw>> {
         let rotation = amount(ROTATION, Some("deg"));
         let place = [amount(X, None), amount(Y, None)];
         let cell = |k: usize| row.cells[k].clone();
+        let tied = cell(TIED).and_then(|c| answer(&c).map_err(|f| flaws.push(f)).ok());
         flaws.extend(missing(row));
         let (Some(name), Some(angle)) = (cell(NAME), angle) else {
             continue;
@@ -99,6 +112,7 @@ pub fn read(text: &str) -> Result<Book, Vec<Flaw>> {
             layer: cell(LAYER),
             place,
             rotation,
+            tied,
             span: row.span.clone(),
         });
     }
@@ -113,6 +127,18 @@ pub fn read(text: &str) -> Result<Book, Vec<Flaw>> {
         true => Ok(Book { rows }),
         false => Err(flaws),
     }
+}
+
+/// Yes or no, in small letters or large ones.
+fn answer(cell: &Cell) -> Result<(bool, Range<usize>), Flaw> {
+    let given = cell.text.to_lowercase();
+    let found = ANSWERS.iter().find(|(word, _)| *word == given);
+    found
+        .map(|(_, is)| (*is, cell.span.clone()))
+        .ok_or_else(|| {
+            let problem = format!("`tied` is `{}`", crate::text::shown(&cell.text));
+            Flaw::at(cell.span.clone(), problem).expected("`yes`, `no`, or nothing")
+        })
 }
 
 /// What a row leaves open.
@@ -140,10 +166,10 @@ mod tests {
 
     #[test]
     fn a_book_is_read_in_its_order_with_units_as_people_write_them() {
-        let text = "# layup of the hat\nname,material,angle,outline,layer,x [mm],y [mm],rotation,note\n\
-                    skin,woven,45,skin.dxf,PLY,10,-5,,first\n\
-                    cap,,-45 deg,,,1 cm,,90,\n\
-                    patch,m/ncf.yaml,0.5 rad,patch.csv,,,,0.25 rad,\"a, b\"\n";
+        let text = "# layup of the hat\nname,material,angle,outline,layer,x [mm],y [mm],rotation,tied,note\n\
+                    skin,woven,45,skin.dxf,PLY,10,-5,,,first\n\
+                    cap,,-45 deg,,,1 cm,,90,Yes,\n\
+                    patch,m/ncf.yaml,0.5 rad,patch.csv,,,,0.25 rad,no,\"a, b\"\n";
         let book = read(text).unwrap_or_else(|e| panic!("{e:?}"));
         let names: Vec<&str> = book.rows.iter().map(|r| r.name.text.as_str()).collect();
         assert_eq!(names, ["skin", "cap", "patch"]);
@@ -160,12 +186,13 @@ mod tests {
         assert_eq!(cap.place[0].as_ref().map(|p| p.text.as_str()), Some("1 cm"));
         assert!(cap.material.is_none() && cap.outline.is_none() && cap.place[1].is_none());
         assert_eq!(patch.rotation.as_ref().map(|r| r.si), Some(0.25));
+        let tied = book.rows.iter().map(|r| r.tied.as_ref().map(|t| t.0));
+        assert_eq!(tied.collect::<Vec<_>>(), [None, Some(true), Some(false)]);
     }
 
     #[test]
     fn all_that_is_wrong_is_told_with_line_and_column() {
-        let text =
-            "name,angle,outline,layer,x\na,,,,\nb,steep,,,1\na,0,,,2 mm\na,1,,PLY,3 kg\n,0,,,\n";
+        let text = "name,angle,outline,layer,x,tied\na,,,,,\nb,steep,,,1,\na,0,,,2 mm,\na,1,,PLY,3 kg,\n,0,,,,\nc,0,,,,below\n";
         let flaws = read(text).unwrap_err();
         let told: Vec<String> = flaws.iter().map(|f| f.of("b.csv", text)).collect();
         let begin = [
@@ -176,6 +203,7 @@ mod tests {
             "b.csv:5:6: a `layer` without an `outline`",
             "b.csv:5:10: `x`:",
             "b.csv:6:1: the ply has no `name`",
+            "b.csv:7:8: `tied` is `below`",
         ];
         assert_eq!(told.len(), begin.len(), "{told:#?}");
         for (told, begin) in told.iter().zip(begin) {

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 #[serde(deny_unknown_fields)]
 pub struct PlyBook {
     /// Path of the table (CSV), relative to the scene file. Its columns: `name`, `angle`, and where they are needed `material`, `outline`, `layer`,
-    /// `x`, `y`, `rotation`, `note`. Paths in it are relative to the table.
+    /// `x`, `y`, `rotation`, `tied`, `note`. Paths in it are relative to the table.
     pub book: String,
     /// The material of rows that have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
