@@ -45,7 +45,7 @@ pub use course::{Course, HistoryRow, Observer, Outcome};
 pub use error::FormingError;
 pub use forming::Forming;
 pub use judge::absurd;
-pub use measure::{MANY, Penetration};
+pub use measure::{MANY, Penetration, untied};
 pub use request::{Feedback, LocalInput, LocalSheet, Parameters, RecordedWay, Start};
 pub use stack::{Components, RigidName, inverse_bilinear};
 pub use watch::{PairDepth, Watch, Watched, depth_attributes, depth_warnings};

@@ -11,4 +11,4 @@ pub use penetration::{
     too_deep_on_the_way,
 };
 pub use strain::{cell_strain, ply_strains};
-pub use ties::tie_stretch;
+pub use ties::{tie_stretch, untied};

@@ -3,7 +3,7 @@
 use crate::course::Outcome;
 use crate::forming::Forming;
 use crate::load::{PressLoad, StampingLoad};
-use crate::measure::{Penetration, ply_strains, tie_stretch, too_deep_on_the_way};
+use crate::measure::{Penetration, ply_strains, tie_stretch, too_deep_on_the_way, untied};
 use crate::request::Parameters;
 use crate::stack::{Body, StackSheet};
 use crate::watch::depth_warnings;
@@ -68,6 +68,7 @@ pub fn warnings(forming: &Forming, outcome: &Outcome, now: &[Penetration]) -> Ve
     warnings.extend(depth_warnings(&outcome.depths));
     warnings.extend(now.iter().filter_map(Penetration::too_deep));
     warnings.extend(too_deep_on_the_way(now, &outcome.peaks));
+    warnings.extend(untied(forming));
     warnings.extend(stretched_ties(forming));
     let strain = ply_strains(forming).fibre;
     if strain > LARGEST_FIBRE_STRAIN {

@@ -2,7 +2,7 @@
 
 use crate::common::scenes::{ply, press};
 use crate::common::{BuiltIn, fabric, form};
-use plyflow_forming_explicit::{Forming, Outcome, Parameters, build_global};
+use plyflow_forming_explicit::{Forming, Outcome, Parameters, build_global, untied};
 use plyflow_geometry::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 use plyflow_mechanics::contact::{SheetContact, Tie, shape};
 use serde_json::json;
@@ -40,6 +40,21 @@ fn two(outer: f64, tied: bool) -> Parameters {
 fn between(forming: &Forming) -> &SheetContact {
     let mut all = forming.model.sheet_contacts().iter();
     all.find(|c| c.name == "inner/outer").expect("the pair")
+}
+
+#[test]
+fn a_ply_that_lies_beside_the_one_that_it_is_tied_to_is_told() {
+    let mut p = two(0.04, true);
+    p.scene.sheets[0].length = Some("0.04 m".parse().unwrap());
+    p.scene.sheets[1].centre[0] = "0.05 m".parse().unwrap();
+    let forming = build_global(&p, &BuiltIn).unwrap();
+    assert!(between(&forming).ties.items.is_empty());
+    let told = untied(&forming);
+    assert!(
+        told.len() == 1 && told[0].contains("'outer' is tied to 'inner'"),
+        "{told:?}"
+    );
+    assert!(untied(&build_global(&two(0.096, true), &BuiltIn).unwrap()).is_empty());
 }
 
 /// How far (m) a node has slid along its cell from where it was laid over it.
