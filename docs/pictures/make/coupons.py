@@ -3,6 +3,7 @@
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 
 import runs
@@ -147,6 +148,23 @@ def hemisphere():
     style.colour_bar(figure, (width + 140, height + 55, 420, 22), off, "distance from punch and die (mm)")
     style.scale_bar(axes, 40, height + 30, 0.05, width / 0.385)
     return style.save_png(figure, "hemisphere", [shear, off])
+
+
+def tied():
+    """Two plies formed over the hat, loose and tied to each other: the shear of the upper one, drawn on the flat ply."""
+    place = runs.run("stacks/tied")
+    figure, panels = plt.subplots(1, 2, figsize=(6, 1.9), layout="constrained", sharey=True)
+    for axes, step, title in zip(panels, ("loose", "tied"), ("two loose plies", "tied")):
+        formed = runs.artifact(place, step)
+        flat, cells = formed.reference("ply_2")[:, :2] * 1e3, formed.cells("ply_2")
+        shear = np.degrees(formed.field("ply_2", "shear_angle"))
+        shown = PolyCollection(flat[cells], array=shear, cmap="RdBu_r", norm=Normalize(-10, 10), edgecolors="face", linewidths=0.3)
+        axes.add_collection(shown)
+        axes.set(title=f"{title}: {np.abs(shear).max():.0f}° at most", xlabel="x (mm)", aspect="equal", xlim=(-145, 145), ylim=(-75, 75))
+        axes.grid(False)
+    panels[0].set_ylabel("y (mm)")
+    figure.colorbar(shown, ax=panels, label="shear angle (deg)", shrink=0.8)
+    return style.save_png(figure, "tied", [shown])
 
 
 def double_dome():

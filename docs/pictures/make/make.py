@@ -18,7 +18,7 @@ PICTURES = {
     "spar-zones": spar.spar_zones, "tool-spar": spar.tool_spar, "forming-stages": spar.forming_stages, "shear-angle": spar.shear_angle,
     "local-wrinkle": spar.local_wrinkle, "cross-section": spar.cross_section, "energy-ledger": spar.energy_ledger,
     "kinematic": spar.kinematic, "bias-extension": coupons.bias_extension, "cantilever": coupons.cantilever, "buckling": coupons.buckling,
-    "unidirectional": coupons.unidirectional, "crossing": coupons.crossing, "hysteresis": coupons.hysteresis, "double-dome": coupons.double_dome,
+    "unidirectional": coupons.unidirectional, "crossing": coupons.crossing, "hysteresis": coupons.hysteresis, "double-dome": coupons.double_dome, "tied": coupons.tied,
     "hemisphere": coupons.hemisphere, "speed-error": diagrams.speed_error, "bag-layers": diagrams.bag_layers,
     "workflow-graph": diagrams.workflow_graph, "floors": diagrams.floors, "law-in-python": law.law_in_python,
     "files-of-others": others.files_of_others, "export": drawings.export, "steered": drawings.steered, "new-part": drawings.new_part,
