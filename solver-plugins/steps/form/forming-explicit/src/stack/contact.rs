@@ -8,6 +8,7 @@ use crate::stack::place::{Layer, StackPlace};
 use crate::stack::rim::crooked_rim;
 use crate::stack::sheet::StackSheet;
 use plyflow_mechanics::contact::{FoldSpec, FrictionLaw, SheetContact, SlaveItem, Tie, Ties};
+use plyflow_mechanics::mesh::NONE;
 use plyflow_mechanics::model::Model;
 use plyflow_model::scene::{Sheet, SheetKind};
 
@@ -142,6 +143,10 @@ impl<'a> StackContacts<'a> {
 
 /// Whether a node lies over the place in its cell that it has been given, in plan: one beyond the master's rim has been given the nearest cell.
 fn lies_on(model: &Model, item: &SlaveItem) -> bool {
+    // Of a ply without cells, as a zone may have.
+    if item.cell == NONE {
+        return false;
+    }
     let x = model.x();
     let corners = model.cells()[item.cell as usize].map(|n| x[n as usize]);
     let off = |d: usize| {
