@@ -116,6 +116,11 @@ pub fn sharpness(topology: &Topology, points: &[Vec3], nodes: &[u32]) -> f64 {
     nodes.iter().map(turn).fold(0.0, f64::max)
 }
 
+/// Nodes over which the direction of a crest is taken where it goes on to the rim, and how far from it (in cells) a node of the rim may lie to be its end.
+const HEADING: usize = 4;
+const NEAR: f64 = 0.75;
+const CROSSED: f64 = 0.96;
+
 /// Rounds of [`without_steps`], and how far a round goes to the middle of the neighbours and then back.
 const ROUNDS: usize = 4;
 const FORTH: f64 = 0.5;
@@ -208,32 +213,52 @@ impl Region<'_> {
             return Some(vec![start]);
         }
         let nodes = self.between(first, last)?;
-        if sharpness(self.topology, self.points, &nodes) <= SHARP {
-            return Some(nodes);
-        }
-        match [first, last].map(|end| self.top_of_rim(end)) {
+        let backwards: Vec<u32> = nodes.iter().rev().copied().collect();
+        match [&backwards, &nodes].map(|line| self.end_at_rim(line)) {
             ends if ends == [first, last] => Some(nodes),
             [first, last] => self.between(first, last),
         }
     }
 
-    /// At the rim of the mesh, where only one side of it is known, a crest sharper than the mesh is not told by its curvature: from a node of the rim, up along it to
-    /// where the sheet stands off most.
-    fn top_of_rim(&self, end: u32) -> u32 {
-        let margin = |i: u32| self.margin.get(i as usize).copied().unwrap_or(0.0);
-        let mut at = end;
-        if !self.topology.is_free(end as usize) {
+    /// Where a line that ends at the mesh's rim is to end. At the rim only one side of a crest is seen: nodes beyond the one at which the crest leaves the mesh look like its
+    /// crest too, down to the foot of its flank, and are further off. So the crest is drawn on straight from the last node of the line on it that is not of the rim, and
+    /// ends at the node of the rim that comes nearest. A crest that runs along the rim, or does not come near it, ends where the line did.
+    fn end_at_rim(&self, line: &[u32]) -> u32 {
+        let end = line[line.len() - 1];
+        let free = |i: u32| self.topology.is_free(i as usize);
+        if !free(end) {
             return end;
         }
-        loop {
-            let beside = self.topology.edge_neighbours(at as usize).iter().copied();
-            let beside =
-                beside.filter(|&i| self.inside[i as usize] && self.topology.is_free(i as usize));
-            match beside.reduce(|a, b| if margin(b) > margin(a) { b } else { a }) {
-                Some(next) if margin(next) > margin(at) => at = next,
-                _ => return at,
-            }
-        }
+        let within = line.iter().rev().copied();
+        let within = within.filter(|&i| !free(i) && self.on_crest(i));
+        let within: Vec<u32> = within.take(HEADING).collect();
+        let &[from, _, _, ..] = within.as_slice() else {
+            return end;
+        };
+        let out = self.way(from, end);
+        let along = within.into_iter().map(|i| {
+            let axis = self.curvature[i as usize].min_direction;
+            scale(axis, if dot(axis, out) < 0.0 { -1.0 } else { 1.0 })
+        });
+        let along = unit(along.fold([0.0; 3], add));
+        let top = crest(self.topology, self.points, self.curvature, from);
+        let ring = self.topology.ring(from as usize);
+        let size = ring.iter().map(|&i| norm(self.way(from, i))).sum::<f64>() / ring.len() as f64;
+        let beside = |i: u32| {
+            let way = sub(self.points[i as usize], top);
+            let ahead = dot(way, along);
+            (ahead > 0.0).then(|| norm(sub(way, scale(along, ahead))))
+        };
+        let rim = self.nodes.iter().copied().filter(|&i| free(i));
+        let near = rim.filter_map(|i| Some((i, beside(i)?)));
+        let near = near.filter(|(_, beside)| *beside < NEAR * size);
+        let nearest = near.reduce(|a, b| if b.1 < a.1 { b } else { a });
+        let crossed = |&(i, _): &(u32, f64)| {
+            let rim = self.topology.edge_neighbours(i as usize).iter();
+            let rim = rim.filter(|&&n| free(n)).map(|&n| self.way(i, n));
+            rim.fold(0.0, |most: f64, w| most.max(dot(w, along).abs() / norm(w))) < CROSSED
+        };
+        nearest.filter(crossed).map_or(end, |(i, _)| i)
     }
 
     /// The path between two nodes that is shortest where lengths count the more the less the ply is curved.
