@@ -4,6 +4,7 @@
 //! has looked at closely enough is not judged, and said to be so.
 
 mod defects;
+mod draped;
 mod evidence;
 mod fields;
 mod governed;
@@ -71,10 +72,10 @@ fn of_run(input: &ReportInput, limits: &Limits) -> Vec<Judged> {
     let mut all = Vec::new();
     for study in &studies {
         let sheets = study.global.as_ref().map(|g| g.facts.sheets.as_slice());
-        let governed = Governed::new(limits, sheets.unwrap_or_default());
         let of = if studies.len() > 1 { &study.title } else { "" };
         let defects = defects::Look::new(input, &material, study);
         let fields = fields::Look::new(input, &material, study);
+        let governed = Governed::new(limits, sheets.unwrap_or_default()).over(fields.cells());
         all.extend(governed.judged(of, |on| match on {
             LimitOn::WrinkleHeight
             | LimitOn::WrinkleLength
@@ -88,12 +89,11 @@ fn of_run(input: &ReportInput, limits: &Limits) -> Vec<Judged> {
 
 /// The wrinkles by their heights and the bridging by its gaps that were found, each the largest first: what is told where there are no limits.
 pub(crate) fn largest(input: &ReportInput, material: &Material) -> Vec<(LimitOn, Finding)> {
-    let none = Limits::default();
     let mut all = Vec::new();
     for on in [LimitOn::WrinkleHeight, LimitOn::BridgingGap] {
         for study in judged_studies(material) {
-            let evidence = defects::Look::new(input, material, study).evidence(on, &none);
-            let named = evidence.findings.into_iter().filter(|f| f.name.is_some());
+            let list = defects::Look::new(input, material, study).list(on);
+            let named = list.into_iter().filter(|f| f.name.is_some());
             all.extend(named.map(|f| (on, f)));
         }
     }
@@ -134,7 +134,6 @@ impl Found {
 
 /// All wrinkles and places of bridging that were measured.
 pub(crate) fn found(input: &ReportInput, material: &Material) -> Vec<Found> {
-    let none = Limits::default();
     let mut all: Vec<Found> = Vec::new();
     for study in judged_studies(material) {
         let look = defects::Look::new(input, material, study);
@@ -143,7 +142,7 @@ pub(crate) fn found(input: &ReportInput, material: &Material) -> Vec<Found> {
             LimitOn::WrinkleLength,
             LimitOn::BridgingGap,
         ] {
-            for f in look.evidence(on, &none).findings {
+            for f in look.list(on) {
                 let Some(name) = f.name else { continue };
                 let same = |d: &&mut Found| {
                     (&d.name, &d.ply, &d.zone, d.at) == (&name, &f.ply, &f.zone, f.at)

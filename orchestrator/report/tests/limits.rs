@@ -240,3 +240,232 @@ fn of_a_study_every_point_is_judged_by_itself() {
             || page.contains("Over all points, the part is not judged")
     );
 }
+
+/// What was not judged, in one text.
+fn why(judged: &Judged) -> String {
+    assert_eq!(judged.verdict, Kept::NotJudged, "{judged:?}");
+    judged.notes.join("; ")
+}
+
+#[test]
+fn a_place_without_a_cell_is_not_judged() {
+    let (_keep, folder) = folder();
+    let place = |name: &str, x: &str, size: &str| {
+        json!({"name": name, "rectangle": {"centre": [x, "1 mm"], "length": size, "width": size},
+        "shear": "80 deg", "wrinkle_length": "1 m", "fibre_deviation": "80 deg"})
+    };
+    let places = [
+        place("a hair", "0.3 mm", "0.2 mm"),
+        place("beside", "43 m", "20 mm"),
+        place("hidden", "0 mm", "20 mm"),
+        place("over it", "0 mm", "30 mm"),
+    ];
+    let input = with(whole(&folder), json!({"shear": "80 deg", "places": places}));
+    for on in [
+        LimitOn::Shear,
+        LimitOn::WrinkleLength,
+        LimitOn::FibreDeviation,
+    ] {
+        for name in ["a hair", "beside", "hidden"] {
+            let text = why(&of(&input, on, Some(name)));
+            let expected = format!("no cell has its middle in {name}");
+            assert!(text.contains(&expected), "{on:?} {name}: {text}");
+        }
+        let judged = of(&input, on, Some("over it"));
+        assert!(!judged.notes.join("").contains("no cell"), "{judged:?}");
+    }
+    let over = of(&input, LimitOn::Shear, Some("over it"));
+    assert_eq!(over.verdict, Kept::Within);
+}
+
+const WIDE: [&str; 4] = [
+    "wrinkle_height",
+    "wrinkle_length",
+    "bridging_gap",
+    "bridging_area",
+];
+
+fn wide() -> Value {
+    json!({"wrinkle_height": "1 m", "wrinkle_length": "10 m", "bridging_gap": "1 m", "bridging_area": "1 m2"})
+}
+
+#[test]
+fn what_a_drape_does_not_reach_and_what_it_cannot_show_is_not_judged() {
+    let (_keep, folder) = folder();
+    for half in [true, false] {
+        let mut study = Study::new(&folder);
+        (study.half_draped, study.draped) = (half, true);
+        study.forming("coarse", None, 0.004);
+        study.measurement();
+        let input = with(study.input(), wide());
+        assert_eq!(input.judged.len(), WIDE.len());
+        for judged in &input.judged {
+            let text = why(judged);
+            assert_eq!(
+                text.contains("of ply_1 are not draped in coarse"),
+                half,
+                "{text}"
+            );
+            let bridging = matches!(judged.on, LimitOn::BridgingGap | LimitOn::BridgingArea);
+            assert_eq!(text.contains("by geometry alone"), bridging, "{text}");
+        }
+    }
+    // With a detection alone.
+    let mut study = Study::new(&folder);
+    study.half_draped = true;
+    study.forming("coarse", None, 0.004);
+    study.defects(true);
+    let input = with(study.input(), json!({"bridging_gap": "1 m"}));
+    let text = why(&input.judged[0]);
+    assert!(
+        text.contains("not draped") && text.contains("by geometry alone"),
+        "{text}"
+    );
+}
+
+#[test]
+fn of_several_measurements_those_count_that_see_what_is_limited_in_whatever_order() {
+    let limits = json!({"wrinkle_height": "4 mm", "bridging_gap": "4 mm"});
+    for fine_first in [true, false] {
+        let (_keep, folder) = folder();
+        let mut study = Study::new(&folder);
+        study.forming("coarse", None, 0.004);
+        let mut steps = [
+            ("fine", json!({"distance_threshold": 1e-3}), 0.0052),
+            ("rough", json!({"distance_threshold": 5e-3}), 0.0039),
+        ];
+        if !fine_first {
+            steps.reverse();
+        }
+        for (step, parameters, height) in steps {
+            study.parameters = parameters;
+            study.measurement_by(step, height);
+        }
+        let input = with(study.input(), limits.clone());
+        let height = of(&input, LimitOn::WrinkleHeight, None);
+        assert_eq!(height.verdict, Kept::Beyond);
+        assert_eq!(height.worst.unwrap().by, "fine");
+    }
+    // The rough one alone: what it has not seen, nobody has.
+    let (_keep, folder) = folder();
+    let mut study = Study::new(&folder);
+    study.forming("coarse", None, 0.004);
+    study.parameters = json!({"distance_threshold": 5e-3});
+    study.measurement_by("rough", 0.0039);
+    let input = with(study.input(), limits);
+    for on in [LimitOn::WrinkleHeight, LimitOn::BridgingGap] {
+        let text = why(&of(&input, on, None));
+        assert!(
+            text.contains("rough counts what is larger than 5 mm only"),
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn a_step_that_counts_only_larger_defects_than_usual_judges_no_other_size_of_them() {
+    use LimitOn::{
+        BridgingArea as Area, BridgingGap as Gap, WrinkleHeight as Height, WrinkleLength as Length,
+    };
+    for (key, value, missed) in [
+        ("distance_threshold", 0.02, [Length, Area].as_slice()),
+        ("curvature_threshold", 400.0, &[Height, Length]),
+        ("minimum_wrinkle_length", 0.05, &[Height]),
+        ("minimum_bridging_area", 0.01, &[Gap]),
+    ] {
+        let (_keep, folder) = folder();
+        let mut study = Study::new(&folder);
+        study.forming("coarse", None, 0.004);
+        study.parameters = json!({key: value});
+        study.measurement();
+        let input = with(study.input(), wide());
+        for judged in &input.judged {
+            let text = judged.notes.join("; ");
+            let told = text.contains(&format!("give it `{key}` of "));
+            assert_eq!(
+                told,
+                missed.contains(&judged.on),
+                "{key} {:?}: {text}",
+                judged.on
+            );
+        }
+    }
+}
+
+#[test]
+fn the_usual_sizes_are_those_of_the_steps() {
+    for manifest in [
+        include_str!("../../../solver-plugins/steps/compare/defect-measurement/manifest.json"),
+        include_str!("../../../solver-plugins/steps/compare/comparison/manifest.json"),
+    ] {
+        let manifest: Value = serde_json::from_str(manifest).unwrap();
+        for (key, usual) in [
+            ("distance_threshold", "1 mm"),
+            ("curvature_threshold", "0.1 1/mm"),
+            ("minimum_wrinkle_length", "10 mm"),
+            ("minimum_bridging_area", "50 mm2"),
+        ] {
+            assert_eq!(manifest["parameters"][key]["default"], usual, "{key}");
+        }
+    }
+}
+
+#[test]
+fn a_detection_that_flags_only_what_is_far_off_judges_nothing_outside_of_the_zones() {
+    let (_keep, folder) = folder();
+    let mut study = Study::new(&folder);
+    study.flagged_from = 0.03;
+    study.forming("coarse", None, 0.004);
+    study.defects(false);
+    study.zones(&[]);
+    study.parameters = json!({"distance_threshold": 1e-3});
+    study.comparison(&[]);
+    let all = json!({"wrinkle_height": "10 mm", "wrinkle_length": "10 m", "bridging_gap": "10 mm", "bridging_area": "1 m2"});
+    let study = study.input();
+    let input = with(study.clone(), all);
+    for judged in &input.judged {
+        let text = why(judged);
+        assert!(
+            text.contains("flags distances from 30 mm on only"),
+            "{:?}: {text}",
+            judged.on
+        );
+    }
+    // With limits that large it has looked closely enough.
+    let input = with(
+        study,
+        json!({"bridging_gap": "40 mm", "wrinkle_height": "40 mm"}),
+    );
+    assert!(
+        input.judged.iter().all(|j| j.verdict == Kept::Within),
+        "{:?}",
+        input.judged
+    );
+}
+
+#[test]
+fn what_is_flagged_outside_of_the_zones_is_not_judged_unless_it_is_too_small_for_a_zone() {
+    for (least, open) in [(2e-4, true), (1.0, false)] {
+        let (_keep, folder) = folder();
+        let mut study = Study::new(&folder);
+        study.forming("coarse", None, 0.004);
+        study.defects(false);
+        study.parameters = json!({"minimum_area": least, "distance_threshold": 1e-3});
+        study.zones(&[]);
+        study.comparison(&[]);
+        let input = with(study.input(), wide());
+        for judged in &input.judged {
+            let text = judged.notes.join("; ");
+            assert!(
+                text.contains("are flagged in coarse where no fine run has looked"),
+                "{text}"
+            );
+            let of_gap = judged.on == LimitOn::BridgingGap;
+            assert_eq!(
+                judged.verdict == Kept::NotJudged,
+                open && !of_gap,
+                "{judged:?}"
+            );
+        }
+    }
+}

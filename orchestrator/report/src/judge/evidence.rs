@@ -23,4 +23,22 @@ impl Evidence {
             ..Self::default()
         }
     }
+
+    /// With what another one has looked at, each text once.
+    pub(crate) fn and(mut self, other: Self) -> Self {
+        self.findings.extend(other.findings);
+        let texts = [
+            (&mut self.by, other.by),
+            (&mut self.open, other.open),
+            (&mut self.notes, other.notes),
+        ];
+        for (all, more) in texts {
+            for text in more {
+                if !all.contains(&text) {
+                    all.push(text);
+                }
+            }
+        }
+        self
+    }
 }

@@ -1,5 +1,6 @@
 //! Shear, strain and deviation of fibres: in every cell of the finest run that has it.
 
+use super::draped;
 use super::evidence::Evidence;
 use super::governed::Governed;
 use crate::input::ReportInput;
@@ -59,6 +60,13 @@ impl<'a> Look<'a> {
             .collect();
         let zones = runs.iter().filter_map(|r| r.zone).collect();
         Self { runs, zones }
+    }
+
+    /// The middles of the cells of all runs that can be read, by ply (m).
+    pub(super) fn cells(&self) -> Vec<(&str, &[[f64; 2]])> {
+        let plies = self.runs.iter().filter_map(|r| r.plies.as_ref().ok());
+        let sheets = plies.flatten();
+        sheets.map(|s| (s.ply.as_str(), s.at.as_slice())).collect()
     }
 
     /// What all cells tell of a quantity: for each run, ply and place of the limits the worst one.
@@ -192,9 +200,9 @@ fn sheet(artifact: &Artifact, told: &plyflow_model::artifact::Sheet) -> Result<S
         values.filter(|v| v.len() == cells.len())
     };
     // What is not draped has no shear, though noughts stand there.
-    let draped = field("draped");
+    let is_draped = field("draped");
     let kept: Vec<usize> = (0..cells.len())
-        .filter(|i| draped.as_ref().is_none_or(|d| d[*i] > 0.5))
+        .filter(|i| is_draped.as_ref().is_none_or(|d| d[*i] > 0.5))
         .collect();
     let of_kept = |values: Vec<f64>| kept.iter().map(|i| values[*i]).collect::<Vec<f64>>();
     let larger = |(a, b): (f64, f64)| if b.abs() > a.abs() { b } else { a };
@@ -202,17 +210,15 @@ fn sheet(artifact: &Artifact, told: &plyflow_model::artifact::Sheet) -> Result<S
         (Some(a), Some(b)) => Some(a.into_iter().zip(b).map(larger).collect()),
         (a, b) => a.or(b),
     };
-    let corners = |i: usize| cells[i].map(|n| flat[n as usize]);
-    let middle = |i: &usize| {
-        let c = corners(*i);
-        [0, 1].map(|d| c.iter().map(|p| p[d]).sum::<f64>() / 4.0)
+    let corners = |i: usize| {
+        cells[i].map(|n| {
+            let [x, y, _] = flat[n as usize];
+            [x, y]
+        })
     };
-    let area = |i: usize| {
-        let [a, b, c, d] = corners(i);
-        let (e, f) = ([c[0] - a[0], c[1] - a[1]], [d[0] - b[0], d[1] - b[1]]);
-        0.5 * (e[0] * f[1] - e[1] * f[0]).abs()
-    };
-    let bare = |i: &usize| draped.as_ref().is_some_and(|d| d[*i] <= 0.5);
+    let middle = |i: &usize| draped::middle(&corners(*i));
+    let area = |i: usize| draped::area(&corners(i));
+    let bare = |i: &usize| is_draped.as_ref().is_some_and(|d| d[*i] <= 0.5);
     let formed = artifact.frame_points(name, frame).map_err(|e| said(&e))?;
     let laid = told.laid();
     let shape = PlyShape::of((&flat, &formed), &cells, None, (laid.as_ref(), None));

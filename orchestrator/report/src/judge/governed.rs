@@ -13,6 +13,8 @@ pub(super) struct Governed<'a> {
     /// Of each place of the limits its own corners, if it has a polygon or a rectangle (m).
     corners: Vec<Option<Vec<Point>>>,
     sheets: &'a [Sheet],
+    /// Places that have been looked at, by ply (m); `None`: nothing is known of what there is to look at.
+    looked_at: Option<Vec<(&'a str, &'a [Point])>>,
 }
 
 impl<'a> Governed<'a> {
@@ -23,7 +25,24 @@ impl<'a> Governed<'a> {
             limits,
             corners: limits.places.iter().map(own).collect(),
             sheets,
+            looked_at: None,
         }
+    }
+
+    /// With the middles of all cells that something was looked for in, by ply (m): where there is none, nothing can be found.
+    pub(super) fn over(mut self, cells: Vec<(&'a str, &'a [Point])>) -> Self {
+        self.looked_at = Some(cells);
+        self
+    }
+
+    /// Whether the limit of a place counts for any cell.
+    fn is_met(&self, on: LimitOn, k: usize) -> bool {
+        let Some(cells) = &self.looked_at else {
+            return true;
+        };
+        let counts = |ply: &str, at: &Point| self.place_at(on, ply, *at) == Some(Some(k));
+        let mut cells = cells.iter();
+        cells.any(|(ply, all)| all.iter().any(|at| counts(ply, at)))
     }
 
     /// Whether a place of the limits holds one of a ply (m).
@@ -82,6 +101,12 @@ impl<'a> Governed<'a> {
         let worst = found.first().cloned();
         let mut open = evidence.open.clone();
         open.extend(at_cuts(&found));
+        if let Some(k) = place.filter(|k| !self.is_met(on, *k)) {
+            open.push(format!(
+                "no cell has its middle in {}: it lies beside the ply, is smaller than the elements, or places after it hold the same",
+                self.limits.places[k].title()
+            ));
+        }
         // The texts of YAML are rounded once when they are read: a value that is the limit is not beyond it.
         let most = size(on, limit) * (1.0 + 1e-12);
         found.retain(|f| size(on, f.value) > most);

@@ -22,7 +22,8 @@ impl Study {
             for (d, judged) in s.distance.iter_mut().zip(&judged) {
                 *d = if *judged { *d } else { BESIDE[0] };
             }
-            let stands_off = |i: &u32| judged[*i as usize] && s.distance[*i as usize] > 0.001;
+            let stands_off =
+                |i: &u32| judged[*i as usize] && s.distance[*i as usize] > self.flagged_from;
             let high = |c: &[u32]| c.iter().any(stands_off) && !flat_tool;
             let flag: Vec<f64> = s
                 .cells
@@ -67,7 +68,7 @@ impl Study {
             json!({"name": name, "flagged_area": area, "over_shear_area": 0.0, "poor_conformity_area": area,
             "shear_min": -0.6, "shear_max": 0.4, "distance_max": 0.006, "judged_share": share})
         };
-        let thresholds = json!({"over_shear_positive": 0.1396, "over_shear_negative": -0.8727, "distance_threshold": 0.001, "foot_margin": 0.01});
+        let thresholds = json!({"over_shear_positive": 0.1396, "over_shear_negative": -0.8727, "distance_threshold": self.flagged_from, "foot_margin": 0.01});
         let attributes = json!({"thresholds": thresholds, "plies": [ply("ply_1"), ply("ply_2")]});
         w.attributes(&attributes.to_string()).unwrap();
         let results = vec![("flagged_area", 2.0 * area, "m2")];
@@ -227,7 +228,12 @@ impl Study {
 
     /// Defects measured on the coarse run: on ply_2 two wrinkles, the first with its crest.
     pub fn measurement(&mut self) {
-        let mut w = self.create("measure", "measurement");
+        self.measurement_by("measure", 0.0052);
+    }
+
+    /// The same by another step, by how high the wrinkles are (m).
+    pub fn measurement_by(&mut self, step: &str, height: f64) {
+        let mut w = self.create(step, "measurement");
         let sheets = plies([-HALF[0], -HALF[1], HALF[0], HALF[1]], 0.004);
         for (name, s) in &sheets {
             w.define_mesh(name, &s.flat, 4, &s.cells, "").unwrap();
@@ -260,7 +266,7 @@ impl Study {
             .map(|a| [-0.05, r * a.sin(), r * a.cos()])
             .collect();
         let defect = |number: u32, ridge: &[[f64; 3]]| {
-            json!({"on": "ply_2", "number": number, "type": "wrinkle", "length": 0.021, "amplitude": 0.0052, "area": 4.1e-4,
+            json!({"on": "ply_2", "number": number, "type": "wrinkle", "length": 0.021, "amplitude": height, "area": 4.1e-4,
             "centre": [0.0, 0.0], "ridge": ridge})
         };
         let columns = [
@@ -273,6 +279,6 @@ impl Study {
         w.attributes(&about.to_string()).unwrap();
         let inputs = [("formed", "coarse")];
         let results = vec![("wrinkle_count", 2.0, "1")];
-        self.finish(w, ("measure", &[]), "measurement", &inputs, results);
+        self.finish(w, (step, &[]), "measurement", &inputs, results);
     }
 }

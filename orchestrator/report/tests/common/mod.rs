@@ -50,6 +50,14 @@ pub struct Study {
     pub beside_tool: bool,
     /// The scene that they had; null: an artifact that tells none.
     pub scene: Value,
+    /// Further parameters of the steps that follow.
+    pub parameters: Value,
+    /// Whether the forming runs that follow are drapes by geometry, which reach half of the plies.
+    pub half_draped: bool,
+    /// The same, which reach all of them.
+    pub draped: bool,
+    /// Distance (m) from which on what stands off is flagged.
+    pub flagged_from: f64,
 }
 
 impl Study {
@@ -62,6 +70,10 @@ impl Study {
             parts: Vec::new(),
             beside_tool: false,
             scene: scene(),
+            parameters: json!({}),
+            half_draped: false,
+            draped: false,
+            flagged_from: 0.001,
         }
     }
 
@@ -86,6 +98,9 @@ impl Study {
         let mut parameters = json!({"kinetic_bound": 0.05, "note": "a < b & \"c\""});
         if kind == "forming" && !self.scene.is_null() {
             parameters["scene"] = self.scene.clone();
+        }
+        for (key, value) in self.parameters.as_object().unwrap() {
+            parameters[key] = value.clone();
         }
         let plugin = json!({"name": kind, "version": "0.1.0", "hash": "feed".repeat(16)});
         let bytes = w.finish(&json!({
@@ -157,6 +172,14 @@ impl Study {
                 )
                 .unwrap();
                 further_fields(&mut w, name, s, last);
+                if self.half_draped {
+                    let right = |c: &[u32]| s.flat[3 * c[0] as usize] > 0.0;
+                    let draped: Vec<f64> = (s.cells.chunks(4))
+                        .map(|c| f64::from(u8::from(right(c))))
+                        .collect();
+                    let field = FieldInfo::new(On::Cells, "draped", 1, "1");
+                    w.frame_field(name, field, &draped).unwrap();
+                }
             }
             w.end_frame().unwrap();
         }
@@ -171,7 +194,7 @@ impl Study {
                     "fibre_1": -FRAC_PI_4, "fibre_2": FRAC_PI_4, "outline": [[-x, -y], [x, -y], [x, y], [-x, y]]})
             })
             .collect();
-        let attributes = json!({
+        let mut attributes = json!({
             "scene": "half-pipe", "sheets": list, "element_size": size, "zone": zone_json, "cycles": 40000,
             "elements": elements, "element_cycles": 4e4 * elements as f64,
             "energy": {"peak_drift_ratio": 0.011, "peak_kinetic_ratio": 0.023, "kinetic_bound_kept": self.kinetic_bound_kept, "hourglass_ratio": 0.002},
@@ -192,6 +215,9 @@ impl Study {
             },
             "warnings": if zone.is_none() { json!(["the film <upper> is stretched by 61 %"]) } else { json!([]) },
         });
+        if self.draped || self.half_draped {
+            attributes["net_spacing"] = json!(0.002);
+        }
         w.attributes(&attributes.to_string()).unwrap();
         let input = zone.map(|(name, _)| format!("boundary[{name}]"));
         let inputs: Vec<(&str, &str)> = input.iter().map(|l| ("boundary", l.as_str())).collect();
