@@ -32,7 +32,8 @@ const COLUMNS: [Known; 3] = [
 pub fn read(text: &str, unit: Option<&str>) -> Result<Contours, Vec<Flaw>> {
     let table = Table::read(text, &COLUMNS, 4 * MOST_CORNERS)?;
     let mut contours: Vec<(Option<String>, Closed)> = Vec::new();
-    let mut flaws = Vec::new();
+    let other_unit = |k: usize| table.other_unit(k, unit);
+    let mut flaws: Vec<Flaw> = (0..2).filter_map(other_unit).collect();
     for row in &table.rows {
         let mut point = [0.0; 2];
         for (k, into) in point.iter_mut().enumerate() {

@@ -106,4 +106,36 @@ mod tests {
             assert!(text(bytes).unwrap_err().contains(says));
         }
     }
+
+    #[test]
+    fn a_unit_that_is_not_that_of_the_file_is_refused() {
+        let dxf = |unit: &str| {
+            let words = format!(
+                "0 SECTION 2 HEADER 9 $INSUNITS 70 {unit} 0 ENDSEC 0 SECTION 2 ENTITIES 0 CIRCLE 8 P 10 0 20 0 40 1 0 ENDSEC 0 EOF"
+            );
+            words.replace(' ', "\n") + "\n"
+        };
+        let told = |text: &str, unit: Option<f64>| {
+            let read = read(text, None, unit, Fineness::default());
+            read.map(|c| c.outline[0][0])
+                .map_err(|f| f[0].of("p", text))
+        };
+        let corners = "x [mm],y [mm]\n1000,0\n2000,0\n1000,1000\n";
+        assert_eq!(told(corners, Some(1e-3)), Ok(1.0));
+        assert_eq!(told(corners, None), Ok(1.0));
+        let refused = told(corners, Some(0.0254)).unwrap_err();
+        assert!(
+            refused.starts_with("p:1:1: `x` has the unit `mm` here, and `unit` says in"),
+            "{refused}"
+        );
+        // A drawing that says no unit, or the same.
+        assert_eq!(told(&dxf("0"), Some(0.0254)).unwrap().abs(), 0.0254);
+        assert_eq!(told(&dxf("1"), Some(0.0254)).unwrap().abs(), 0.0254);
+        assert_eq!(told(&dxf("1"), None).unwrap().abs(), 0.0254);
+        let refused = told(&dxf("1"), Some(1e-3)).unwrap_err();
+        assert!(
+            refused.contains("one unit of it is 1 in ($INSUNITS is 1), and `unit` that it is 1 mm"),
+            "{refused}"
+        );
+    }
 }

@@ -38,7 +38,9 @@ pub struct Row {
 /// What is wrong with its form, each with its place.
 pub fn read(text: &str, unit: Option<&str>) -> Result<Vec<Row>, Vec<Flaw>> {
     let table = Table::read(text, &COLUMNS, MOST_POINTS)?;
-    let (mut rows, mut flaws) = (Vec::new(), Vec::new());
+    let other_unit = |k: usize| table.other_unit(k, unit);
+    let mut flaws: Vec<Flaw> = (0..2).filter_map(other_unit).collect();
+    let mut rows = Vec::new();
     for row in &table.rows {
         let amount = |k: usize, unit: Option<&str>| match &row.cells[k] {
             Some(cell) => table.amount(k, cell, unit),
@@ -90,6 +92,13 @@ mod tests {
         assert_eq!(all, [[0.0; 3], [0.0125, -0.03, 0.5]]);
         assert_eq!(rows[0].angle.text, "0 deg");
         assert!(text[rows[1].span.clone()].starts_with("12,5"));
+        let both = read("x [mm],y [mm],direction\n1,2,180\n", Some("cm")).unwrap_err();
+        assert!(
+            both[0]
+                .problem
+                .contains("`x` has the unit `mm` here, and `unit` says cm")
+        );
+        assert_eq!(both.len(), 2, "of `y` as well");
         let bare = read("x,y,direction\n1,2,180\n", Some("cm")).unwrap();
         assert_eq!(bare[0].place[1].text, "2 cm");
         assert_eq!(bare[0].angle.si, std::f64::consts::PI);

@@ -53,6 +53,8 @@ pub struct Table {
     known: &'static [Known],
     /// For each known column its head, if it is there.
     heads: Vec<Option<Head>>,
+    /// Where each of them stands.
+    places: Vec<Range<usize>>,
     /// Where the head stands.
     pub head: Range<usize>,
     /// The rows.
@@ -217,6 +219,7 @@ impl Table {
         let mut table = Table {
             known,
             heads: vec![None; known.len()],
+            places: vec![0..0; known.len()],
             head: places.line(first),
             rows: Vec::new(),
             decimal: Decimal::Point,
@@ -308,8 +311,8 @@ impl Table {
                     flaws.push(Flaw::at(span, problem).expected("one of each"));
                 }
                 Some(k) => {
-                    flaws.extend(wrong_unit(&known[k], &head, span));
-                    self.heads[k] = Some(head);
+                    flaws.extend(wrong_unit(&known[k], &head, span.clone()));
+                    (self.heads[k], self.places[k]) = (Some(head), span.clone());
                 }
                 None => flaws.extend(unknown(known, &head.name, span)),
             }
@@ -325,6 +328,25 @@ impl Table {
             true => Ok(order),
             false => Err(flaws),
         }
+    }
+
+    /// What is wrong where the head of a column has another unit than `given` is.
+    pub fn other_unit(&self, column: usize, given: Option<&str>) -> Option<Flaw> {
+        let (known, given) = (&self.known[column], given?);
+        let told = self.heads[column].as_ref()?.unit.as_deref()?;
+        let of = |unit: &str| parse_quantity(&format!("1 {unit}"), known.of?).ok();
+        let (own, other) = (of(told)?, of(given)?);
+        let same = (own - other).abs() <= 1e-9 * own.abs();
+        (!same).then(|| {
+            let name = known.names[0];
+            let problem = format!(
+                "`{name}` has the unit `{}` here, and `unit` says {given}",
+                shown(told)
+            );
+            let flaw = Flaw::at(self.places[column].clone(), problem);
+            flaw.expected("one unit of the file")
+                .help("correct the one, or leave out the other")
+        })
     }
 
     /// A cell as a quantity of its column: with the unit that it has, with that of the head, or with `else_unit`.

@@ -162,10 +162,21 @@ impl<'t> Drawing<'t> {
     /// The unit that is given, or that the file tells.
     ///
     /// # Errors
-    /// When neither says it.
+    /// When neither says it, or each says another one.
     pub fn unit_or(&self, given: Option<f64>) -> Result<Unit, Flaw> {
         if let Some(given) = given {
-            return Ok(Unit::of(given));
+            let given = Unit::of(given);
+            return match self.unit() {
+                Ok(Some(told)) if (told.one() - given.one()).abs() > 1e-9 * told.one() => {
+                    Err(Flaw::whole(format!(
+                        "the drawing says that one unit of it is {told} ($INSUNITS is {}), and `unit` that it is {given}",
+                        self.unit.unwrap_or_default()
+                    ))
+                    .expected("one unit of the file")
+                    .help("leave out `unit`, or export the drawing again with $INSUNITS 0 or the right one"))
+                }
+                _ => Ok(given),
+            };
         }
         self.unit()?.ok_or_else(|| {
             Flaw::whole("the drawing does not say what its unit is ($INSUNITS is 0 or missing)")

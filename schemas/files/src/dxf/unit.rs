@@ -1,6 +1,6 @@
 //! Units of drawings.
 
-use plyflow_model::units::{Dimension, parse_quantity};
+use plyflow_model::units::{Dimension, parse_quantity, si_text};
 
 /// Symbols of units by `$INSUNITS`.
 pub(super) const UNITS: [(i64, &str); 10] = [
@@ -23,6 +23,15 @@ pub enum Unit {
     Symbol(&'static str),
     /// So many metres.
     Metres(f64),
+}
+
+impl std::fmt::Display for Unit {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Symbol(symbol) => write!(f, "1 {symbol}"),
+            Self::Metres(metres) => f.write_str(&si_text(*metres, Dimension::Length)),
+        }
+    }
 }
 
 impl Unit {
