@@ -163,9 +163,12 @@ fn load_into(
     if other_format(&root, "plyflow", form, &source, problems) {
         return None;
     }
-    overrides::apply(&mut root, wanted.overrides, &mut source, problems, catalog);
+    let lost = overrides::apply(&mut root, wanted.overrides, &mut source, problems, catalog);
     let confirming = confirm::wanted(&mut root, wanted.confirm, &source, catalog, problems)?;
     let family = family(&root, wanted.points, &source, problems)?;
+    if let Some(family) = &family {
+        overrides::without_variables(&lost, &family.names, &source, problems);
+    }
     let shown = family.as_ref().map(|f| f.first(&root));
     Checker::new(&WORKFLOW, &source, problems)
         .check(shown.as_ref().unwrap_or(&root), "the workflow");

@@ -6,6 +6,7 @@ use crate::paths::{Blocked, Word, put, put_in_file};
 use crate::yaml::{Kind, Node, Span, parse};
 use indexmap::IndexMap;
 use plyflow_model::manifest::{Declaration, Shape};
+use std::collections::BTreeSet;
 
 /// `STEP.PARAMETER=VALUE`, the value written as in YAML. Places are those in this text.
 #[derive(Debug, Clone, PartialEq)]
@@ -89,15 +90,17 @@ fn shift(node: &mut Node, by: usize) {
     }
 }
 
-/// Puts the overrides into the tree of a workflow. What is wrong with one is later reported in its own text.
+/// Puts the overrides into the tree of a workflow, and gives what each has taken out of it. What is wrong with one is later reported in its own text.
 pub(crate) fn apply(
     root: &mut Node,
     overrides: &[Override],
     source: &mut Source,
     problems: &mut Problems,
     catalog: &Plugins<'_>,
-) {
+) -> Vec<Lost> {
+    let mut lost = Vec::new();
     for given in overrides {
+        let before = words(root);
         let start = source.add_set(&given.text);
         let on = |w: &Word| Word {
             name: w.name.clone(),
@@ -142,6 +145,61 @@ pub(crate) fn apply(
                 ));
             }
         }
+        let after = words(root);
+        lost.push(Lost {
+            span: wanted.span.start..path[path.len() - 1].span.end,
+            words: before.difference(&after).cloned().collect(),
+        });
+    }
+    lost
+}
+
+/// Words that an override has taken out of the steps.
+pub(crate) struct Lost {
+    /// Where the override names its parameter.
+    span: Span,
+    words: BTreeSet<String>,
+}
+
+/// Reports overrides after which no step depends on one of the `variables` of a study any more: the points would be told with values that they do not have.
+pub(crate) fn without_variables(
+    lost: &[Lost],
+    variables: &[String],
+    source: &Source,
+    problems: &mut Problems,
+) {
+    for Lost { span, words } in lost {
+        for name in variables.iter().filter(|v| words.contains(*v)) {
+            let message =
+                format!("it takes the place of `${{{name}}}`, on which no step depends any more");
+            let d = problems.add(source, span, message);
+            d.expected("a value that no variable of the study sets").help(format!(
+                "the points would be told with values of `{name}` that they do not have: change those in the study instead"
+            ));
+        }
+    }
+}
+
+/// The words of expressions in the values of the steps, variables among them.
+fn words(root: &Node) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    if let Some(steps) = root.get("steps") {
+        words_in(steps, &mut found);
+    }
+    found
+}
+
+fn words_in(node: &Node, found: &mut BTreeSet<String>) {
+    match &node.kind {
+        Kind::Text(text) => {
+            let inner = text.split("${").skip(1).filter_map(|t| t.split('}').next());
+            let is_part = |c: char| c.is_ascii_alphanumeric() || c == '_';
+            let words = inner.flat_map(|t| t.split(move |c| !is_part(c)));
+            found.extend(words.map(str::to_owned));
+        }
+        Kind::List(items) => items.iter().for_each(|n| words_in(n, found)),
+        Kind::Map(entries) => entries.iter().for_each(|e| words_in(&e.value, found)),
+        _ => {}
     }
 }
 

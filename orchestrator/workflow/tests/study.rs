@@ -479,3 +479,45 @@ fn without_a_study_signs_of_variables_are_plain_text() {
     );
     assert!(told(&study).contains("`responses` in a workflow without a study"));
 }
+
+#[test]
+fn a_value_of_the_command_line_in_the_place_of_a_variable_is_refused_unless_another_step_has_it() {
+    let refused = |block: &str, changes: &[(&str, &str)], set: &str| {
+        let study = with(block, changes);
+        let set = [set.parse().unwrap()];
+        let loaded = plyflow_workflow::load_with(&study.path(W), &common::catalog(), &set);
+        loaded.err().map(|found| found.to_string())
+    };
+    let limit = "defects.over_shear_positive=5 deg";
+    for block in [
+        "  vary: {limit: [4 deg]}",
+        "  zip: {limit: [4 deg, 6 deg], d: [0.1, 0.2]}",
+        "  points: [{limit: 4 deg, d: 0.1}, {limit: 6 deg, d: 0.2}]",
+    ] {
+        let damping = ("damping: 0.1", "damping: ${d}");
+        let changes = match block.contains("vary") {
+            true => vec![LIMIT],
+            false => vec![LIMIT, damping],
+        };
+        let told = refused(block, &changes, limit).expect(block);
+        assert!(
+            told.contains("takes the place of `${limit}`") && told.contains("--set:1:1"),
+            "{block}\n{told}"
+        );
+        assert_eq!(refused(block, &changes, "coarse.element_size=9 mm"), None);
+    }
+    // What a path in a scene sets is a place as well.
+    let scene = (
+        "scene: scene.yaml\n      element: m4",
+        "scene: {file: scene.yaml, set: {friction.fabric_diaphragm: \"${mu}\"}}\n      element: m4",
+    );
+    let told = refused(
+        "  vary: {mu: [0.1]}",
+        &[scene],
+        "coarse.scene.friction.fabric_diaphragm=0.3",
+    );
+    assert!(told.unwrap().contains("takes the place of `${mu}`"));
+    // Elsewhere the variable is still what the points are told by.
+    let both = [LIMIT, ("damping: 0.1", "damping: \"${limit} / 80 deg\"")];
+    assert_eq!(refused("  vary: {limit: [4 deg]}", &both, limit), None);
+}
