@@ -24,6 +24,24 @@ pub fn implausible_stiffness(stiffness: f64) -> Option<String> {
     })
 }
 
+/// Bending lengths (m), the cube root of stiffness over weight per area, of fabrics from light to stiff ones. It spans far less than their
+/// stiffnesses, so that lengths in centimetres under a header in millimetres show.
+pub const USUAL_BENDING_LENGTH: [f64; 2] = [0.012, 0.25];
+
+/// What one should know of a bending length (m) that hardly a fabric has.
+pub fn implausible_bending_length(length: f64) -> Option<String> {
+    let [low, high] = USUAL_BENDING_LENGTH;
+    (!(low..=high).contains(&length)).then(|| {
+        format!(
+            "the bending length, the cube root of stiffness over weight, is {} mm; fabrics have {} to {} mm: look at the units of the lengths, of which \
+             the stiffness is the third power",
+            significant(1e3 * length),
+            significant(1e3 * low),
+            significant(1e3 * high)
+        )
+    })
+}
+
 /// How an overhang becomes a stiffness.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -64,6 +64,23 @@ struct Values {
     values: Vec<f64>,
 }
 
+/// Refuses two files with the same rows: what is measured twice is never the same to the last digit, and one file for two specimens would make a spread of nothing.
+///
+/// # Errors
+/// Names both files.
+pub fn distinct(tables: &[Table]) -> Result<(), String> {
+    for (i, table) in tables.iter().enumerate() {
+        if let Some(same) = tables[..i].iter().find(|t| t.columns == table.columns) {
+            return Err(format!(
+                "{} has the rows of {}, the file before it: two specimens never give the same to the last digit, and with one that counts twice the error \
+                 that is told would be too small; give each test once",
+                table.source, same.source
+            ));
+        }
+    }
+    Ok(())
+}
+
 impl Table {
     /// Values of a column (SI), one per row; `None` when the file has no such column.
     pub fn column(&self, name: &str) -> Option<&[f64]> {

@@ -210,6 +210,8 @@ pub struct Shear {
     pub negative_relative_rms: f64,
     /// Largest difference of a test's mean force from that of all tests of its sign, over it; 0 with one test.
     pub scatter: f64,
+    /// Of which tests that is, counted through the positive ones and then the negative ones: of two there is none that is more apart than the other.
+    pub apart: Vec<usize>,
 }
 
 impl Shear {
@@ -272,13 +274,20 @@ pub fn characterise(
     } else {
         None
     };
+    let [(scatter, apart), (of_negative, mut other)] = [positive, negative].map(scatter);
+    other.iter_mut().for_each(|i| *i += positive.len());
+    let (scatter, apart) = match of_negative > scatter {
+        true => (of_negative, other),
+        false => (scatter, apart),
+    };
     let mut shear = Shear {
         law,
         negative: own_negative,
         stitch,
         positive_relative_rms: 0.0,
         negative_relative_rms: 0.0,
-        scatter: scatter(positive).max(scatter(negative)),
+        scatter,
+        apart,
     };
     let other = shear.negative.as_ref().map_or(limit, |l| l.limit);
     let told = [
@@ -317,20 +326,21 @@ fn misfit(tests: &[Points], limit: f64, law: impl Fn(f64) -> f64) -> f64 {
     }
 }
 
-/// Largest difference of a test's mean force from that of all, over the angles that all have.
-fn scatter(tests: &[Test]) -> f64 {
+/// Largest difference of a test's mean force from that of all, over the angles that all have, and of which tests.
+fn scatter(tests: &[Test]) -> (f64, Vec<usize>) {
     let end = |t: &Test| t.points.angle.iter().fold(0.0f64, |m, g| m.max(*g));
     let limit = tests.iter().map(end).fold(f64::INFINITY, f64::min);
     let places = || (1..=50).map(|i| limit * f64::from(i) / 51.0);
     let sum = |t: &Test| places().filter_map(|g| t.force_at(g)).sum::<f64>();
     let sums: Vec<f64> = tests.iter().map(sum).collect();
     let mean = sums.iter().sum::<f64>() / sums.len().max(1) as f64;
-    let apart = sums.iter().map(|s| (s / mean - 1.0).abs());
     if tests.len() < 2 {
-        0.0
-    } else {
-        apart.fold(0.0, f64::max)
+        return (0.0, Vec::new());
     }
+    let apart: Vec<f64> = sums.iter().map(|s| (s / mean - 1.0).abs()).collect();
+    let most = apart.iter().copied().fold(0.0, f64::max);
+    let is_most = |i: &usize| apart[*i] > 0.999 * most;
+    (most, (0..tests.len()).filter(is_most).collect())
 }
 
 /// Which tests ended (rad) before the stitch would have failed, and what to do.

@@ -7,7 +7,7 @@ use plyflow_characterisation::bending::{Bending, Specimen, characterise};
 use plyflow_characterisation::cantilever::{
     PLAUSIBLE_OVERHANG, implausible_stiffness, mean_and_deviation,
 };
-use plyflow_characterisation::csv::{Column, read};
+use plyflow_characterisation::csv::{Column, distinct, read};
 use plyflow_characterisation::material::{self, Template, quantity, significant};
 use plyflow_characterisation::output::Output;
 use plyflow_characterisation::profile::{Choice, Method, Profile};
@@ -41,6 +41,8 @@ struct Parameters {
 
 /// No strip of fabric is tested with less outside the clamp (m).
 const LEAST_REACH: f64 = 0.01;
+/// Overhangs (m) with which strips are tested: lengths in centimetres under a header in millimetres show.
+const USUAL_OVERHANG: [f64; 2] = [0.025, 0.6];
 /// A strip that lies so many times farther from its points than the polynomial, and farther than this part of its length, is not one of Voce's law.
 const MUCH_FARTHER: f64 = 1.5;
 const FAR: f64 = 5e-4;
@@ -68,6 +70,7 @@ impl Step for CharacteriseBending {
         let found = characterise(&profiles, weight, &choice)?;
         warn(host, &found, &names);
         warn_of_reach(host, &found, &p.report_at);
+        warn_of_units(host, &found, weight, &names);
         let mut out = Output::default();
         write_profiles(&mut out, &found, &profiles, &names);
         write_law(&mut out, &found, &names);
@@ -125,6 +128,7 @@ fn profiles(host: &Host, p: &Parameters) -> Result<(Vec<Profile>, Vec<String>), 
         )),
         (None, false) => {
             let (mut profiles, mut names) = (Vec::new(), Vec::new());
+            let mut tables = Vec::new();
             for path in &p.profiles {
                 let table = read(path, &COLUMNS)?;
                 table.at_least(
@@ -140,7 +144,9 @@ fn profiles(host: &Host, p: &Parameters) -> Result<(Vec<Profile>, Vec<String>), 
                 reaches_out(&table.source, x, z)?;
                 profiles.push(Profile::new(x, z, p.clamp_tolerance, &|i| table.place(i))?);
                 names.push(table.source.clone());
+                tables.push(table);
             }
+            distinct(&tables)?;
             Ok((profiles, names))
         }
     }
@@ -198,6 +204,27 @@ fn warn_of_reach(host: &Host, found: &Bending, report_at: &[f64]) {
         host.log(Log::Warn, &text);
     }
     if let Some(text) = implausible_stiffness(found.voce.law.initial_stiffness()) {
+        host.log(Log::Warn, &text);
+    }
+}
+
+/// Says where lengths or the weight are none that strips of fabric have.
+fn warn_of_units(host: &Host, found: &Bending, weight: f64, names: &[String]) {
+    let [low, high] = USUAL_OVERHANG;
+    for (specimen, name) in found.specimens.iter().zip(names) {
+        let overhang = specimen.hanging.length;
+        if !(low..=high).contains(&overhang) {
+            let text = format!(
+                "{name}: the strip hangs out by {} mm; such strips hang out by {:.0} to {:.0} mm: look at the units of the header, [..], as moments go with the \
+                 third power of the lengths",
+                significant(1e3 * overhang),
+                1e3 * low,
+                1e3 * high
+            );
+            host.log(Log::Warn, &text);
+        }
+    }
+    if let Some(text) = material::implausible_areal_mass(weight / GRAVITY) {
         host.log(Log::Warn, &text);
     }
 }

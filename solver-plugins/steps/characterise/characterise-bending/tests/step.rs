@@ -320,3 +320,37 @@ fn bad_profiles_are_refused_with_file_and_line() {
     .unwrap_err();
     assert!(e.contains("profile/z"), "{e}");
 }
+
+#[test]
+fn one_file_is_one_specimen_and_units_that_no_strip_has_are_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let law = &BENDING[0];
+    let [first, other] =
+        [(1, "a.csv"), (2, "b.csv")].map(|(seed, name)| csv(folder.path(), name, law, 5e-5, seed));
+    let step = |profiles: &[&PathBuf], areal_mass: f64| {
+        let given = json!({"profiles": profiles, "areal_mass": areal_mass});
+        run::<CharacteriseBending>(given, &[], &[])
+    };
+    let told = step(&[&first, &other, &first], law.areal_mass).err();
+    assert!(told.unwrap().contains("a.csv has the rows of a.csv"));
+    let sound = step(&[&first, &other], law.areal_mass).unwrap().log;
+    let units = |log: &[String]| {
+        log.iter()
+            .filter(|l| l.contains("units of the header") || l.contains("areal mass is"))
+            .count()
+    };
+    assert_eq!(units(&sound), 0, "{sound:?}");
+    // A mass in g under kg, and lengths in cm under mm.
+    let heavy = step(&[&first], 1e3 * law.areal_mass).unwrap().log;
+    assert!(
+        heavy.iter().any(|l| l.contains("the areal mass is")),
+        "{heavy:?}"
+    );
+    let text = std::fs::read_to_string(&first).unwrap();
+    let long = folder.path().join("long.csv");
+    std::fs::write(&long, text.replace("[cm]", "[dm]").replace("[mm]", "[cm]")).unwrap();
+    match step(&[&long], law.areal_mass) {
+        Ok(out) => assert!(units(&out.log) > 0, "{:?}", out.log),
+        Err(told) => assert!(told.contains("unit"), "{told}"),
+    }
+}

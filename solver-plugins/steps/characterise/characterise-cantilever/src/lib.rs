@@ -5,8 +5,8 @@
 
 use plyflow_characterisation::GRAVITY;
 use plyflow_characterisation::cantilever::{
-    Formula, PLAUSIBLE_OVERHANG, STANDARD_ANGLE, implausible_stiffness, mean_and_deviation,
-    stiffness,
+    Formula, PLAUSIBLE_OVERHANG, STANDARD_ANGLE, implausible_bending_length, implausible_stiffness,
+    mean_and_deviation, stiffness,
 };
 use plyflow_characterisation::confidence::student;
 use plyflow_characterisation::csv::{Column, Table, read};
@@ -42,8 +42,13 @@ const COLUMNS: [Column; 2] = [
 const SCATTER: f64 = 0.3;
 
 /// Says what makes the mean doubtful.
-fn warn(host: &Host, mean: f64, deviation: f64) {
-    if let Some(text) = implausible_stiffness(mean) {
+fn warn(host: &Host, weight: f64, mean: f64, deviation: f64) {
+    let doubts = [
+        implausible_stiffness(mean),
+        implausible_bending_length((mean / weight).fixed_cbrt()),
+        material::implausible_areal_mass(weight / GRAVITY),
+    ];
+    for text in doubts.into_iter().flatten() {
         host.log(Log::Warn, &text);
     }
     if deviation > SCATTER * mean {
@@ -108,7 +113,7 @@ impl Step for CharacteriseCantilever {
         table.plausible_length("overhang", PLAUSIBLE_OVERHANG, "a strip of fabric")?;
         let [mean, deviation] = mean_and_deviation(&stiffnesses);
         let n = stiffnesses.len();
-        warn(host, mean, deviation);
+        warn(host, weight, mean, deviation);
         let mut out = Output::default();
         let numbers: Vec<f64> = (1..=n).map(|i| i as f64).collect();
         out.curve("curves/specimens/number", "1", &numbers);

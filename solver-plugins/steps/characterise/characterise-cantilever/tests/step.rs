@@ -136,3 +136,35 @@ fn bad_overhangs_are_refused_with_file_and_line() {
         assert!(e.contains(expected), "{e}");
     }
 }
+
+#[test]
+fn overhangs_and_masses_in_another_unit_than_that_of_the_header_are_warned_of() {
+    // 190 mm and 0.44 kg/m2, the lengths in cm under a header in mm, and the other way about; the mass in g.
+    for (text, mass, says) in [
+        ("overhang [mm]\n19\n20\n", 0.44, Some("the bending length")),
+        (
+            "overhang [cm]\n190\n199\n",
+            0.44,
+            Some("the bending length"),
+        ),
+        (
+            "overhang [mm]\n190\n200\n",
+            440.0,
+            Some("the areal mass is 440 kg/m2"),
+        ),
+        (
+            "overhang [mm]\n190\n200\n",
+            4.4e-4,
+            Some("the areal mass is 0.00044 kg/m2"),
+        ),
+        ("overhang [mm]\n190\n200\n", 0.44, None),
+    ] {
+        let (_folder, path) = file(text);
+        let given = json!({"overhangs": path, "areal_mass": mass});
+        let log = run::<CharacteriseCantilever>(given, &[], &[]).unwrap().log;
+        match says {
+            Some(says) => assert!(log.iter().any(|l| l.contains(says)), "{text}: {log:?}"),
+            None => assert!(log.is_empty(), "{log:?}"),
+        }
+    }
+}

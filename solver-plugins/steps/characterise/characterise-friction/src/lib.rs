@@ -5,7 +5,7 @@
 
 use plyflow_characterisation::cantilever::mean_and_deviation;
 use plyflow_characterisation::confidence::student;
-use plyflow_characterisation::csv::{Column, read};
+use plyflow_characterisation::csv::{Column, Table, distinct, read};
 use plyflow_characterisation::material::significant;
 use plyflow_characterisation::output::Output;
 use plyflow_characterisation::sled::{Pull, evaluate};
@@ -36,6 +36,8 @@ const COLUMNS: [Column; 2] = [
 
 /// Coefficients of fabrics, films and tools: what lies outside is a wrong unit.
 const PLAUSIBLE: [f64; 2] = [0.02, 3.0];
+/// No sled is pulled farther (m).
+const LONGEST_PULL: f64 = 1.0;
 /// Parts of the dynamic coefficient that are warned of: of a force before the sled moves, of a drift over the window, of stick-slip.
 const AT_REST: f64 = 0.05;
 const DRIFT: f64 = 0.1;
@@ -123,9 +125,12 @@ impl Step for CharacteriseFriction {
         }
         let mut out = Output::default();
         let (mut pulls, mut series) = (Vec::<Pull>::new(), Vec::new());
-        for (i, path) in p.pulls.iter().enumerate() {
-            let table = read(path, &COLUMNS)?;
-            let pull = evaluate(&table, [p.from, p.to], normal)?;
+        let tables = p.pulls.iter().map(|path| read(path, &COLUMNS));
+        let tables: Vec<Table> = tables.collect::<Result<_, _>>()?;
+        distinct(&tables)?;
+        for (i, table) in tables.iter().enumerate() {
+            table.plausible_length("displacement", [0.0, LONGEST_PULL], "a sled")?;
+            let pull = evaluate(table, [p.from, p.to], normal)?;
             warn(host, &table.source, &pull, [p.from, p.to]);
             pulls.push(pull);
             let [x, y] =

@@ -107,3 +107,25 @@ fn a_window_from_the_first_row_has_no_static_coefficient() {
     let later = of(0.1);
     assert!(later.results.contains_key("static_coefficient") && text(&later).contains("static"));
 }
+
+#[test]
+fn one_file_is_one_pull_and_a_sled_is_pulled_less_than_a_metre() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = pull(folder.path(), "a.csv", 0.4, 0.3, 1);
+    let other = pull(folder.path(), "b.csv", 0.4, 0.3, 2);
+    let copy = folder.path().join("c.csv");
+    std::fs::copy(&first, &copy).unwrap();
+    let refused = |pulls: &[&PathBuf]| {
+        let given = json!({"pulls": pulls, "normal_force": 5.0});
+        run::<CharacteriseFriction>(given, &[], &[]).err()
+    };
+    assert_eq!(refused(&[&first, &other]), None);
+    for twice in [[&first, &other, &first], [&other, &first, &copy]] {
+        let told = refused(&twice).expect("two pulls of one file");
+        assert!(told.contains("has the rows of a.csv"), "{told}");
+    }
+    let text = std::fs::read_to_string(&first).unwrap();
+    std::fs::write(&copy, text.replace("[mm]", "[m]")).unwrap();
+    let told = refused(&[&copy]).expect("a pull of 250 m");
+    assert!(told.contains("column 'displacement [m]'"), "{told}");
+}

@@ -4,7 +4,7 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 use plyflow_characterisation::Dimension;
-use plyflow_characterisation::csv::{Column, read};
+use plyflow_characterisation::csv::{Column, Table, distinct, read};
 use plyflow_characterisation::material::{self, Block, Template, quantity, significant};
 use plyflow_characterisation::output::Output;
 use plyflow_characterisation::picture_frame::{
@@ -73,10 +73,14 @@ impl Step for CharacterisePictureFrame {
             return Err("`specimen_side` is larger than `frame_side`; the sheared part lies within the frame".into());
         }
         let mut out = Output::default();
+        let tables = p.positive.iter().chain(&p.negative);
+        let tables = tables.map(|path| read(path, &COLUMNS));
+        let tables: Vec<Table> = tables.collect::<Result<_, _>>()?;
+        distinct(&tables)?;
+        let (up, down) = tables.split_at(p.positive.len());
         let (positive, mut series) =
-            read_tests(host, &mut out, &frame, (&p.positive, p.zero, p.stitch), 1.0)?;
-        let (negative, more) =
-            read_tests(host, &mut out, &frame, (&p.negative, p.zero, false), -1.0)?;
+            read_tests(host, &mut out, &frame, (up, p.zero, p.stitch), 1.0)?;
+        let (negative, more) = read_tests(host, &mut out, &frame, (down, p.zero, false), -1.0)?;
         let shear = characterise(&positive, &negative, p.stitch, p.degree, p.maximum_angle)?;
         for (law, which) in laws(&shear) {
             if let Some(refused) = &law.fit.refused {
@@ -84,7 +88,7 @@ impl Step for CharacterisePictureFrame {
             }
             warn_of_law(host, law, which);
         }
-        warn_of_tests(host, &shear);
+        warn_of_tests(host, &shear, &tables);
         let tests: Vec<&Test> = positive.iter().chain(&negative).collect();
         series.extend(more);
         write_fit(&mut out, &shear, !negative.is_empty(), series);
@@ -115,14 +119,13 @@ fn read_tests(
     host: &Host,
     out: &mut Output,
     frame: &Frame,
-    (paths, choice, stitched): (&[String], ZeroChoice, bool),
+    (tables, choice, stitched): (&[Table], ZeroChoice, bool),
     sign: f64,
 ) -> Result<(Vec<Test>, Vec<Series>), StepError> {
     let name = if sign > 0.0 { "positive" } else { "negative" };
     let (mut tests, mut series) = (Vec::new(), Vec::new());
-    for (i, path) in paths.iter().enumerate() {
-        let table = read(path, &COLUMNS)?;
-        let test = Test::new(&table, frame, choice, stitched)?;
+    for (i, table) in tables.iter().enumerate() {
+        let test = Test::new(table, frame, choice, stitched)?;
         warn_of_zero(host, &table.source, &test, choice);
         warn_of_rows(host, &table.source, &test);
         let [x, y] =
@@ -243,10 +246,12 @@ fn warn_of_law(host: &Host, law: &Law, which: &str) {
 }
 
 /// Says where tests of one sign do not agree, and where the signs do not.
-fn warn_of_tests(host: &Host, shear: &Shear) {
+fn warn_of_tests(host: &Host, shear: &Shear, tables: &[Table]) {
     if shear.scatter > SCATTER {
+        let names = shear.apart.iter().map(|i| tables[*i].source.as_str());
         let text = format!(
-            "the mean force of a test is {:.0} % from that of all tests of its sign: are all of one fabric and of one size (`specimen_side`)?",
+            "{}: the mean force of a test is {:.0} % from that of all tests of its sign: are all of one fabric and of one size (`specimen_side`)?",
+            names.collect::<Vec<_>>().join(", "),
             100.0 * shear.scatter
         );
         host.log(Log::Warn, &text);

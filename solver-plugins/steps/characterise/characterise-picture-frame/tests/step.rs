@@ -435,3 +435,42 @@ fn bad_tests_are_refused_with_file_and_line() {
     let large = json!({"positive": [good], "frame_side": SIDE, "specimen_side": 2.0 * SIDE});
     assert!(error(large).contains("`specimen_side` is larger"));
 }
+
+#[test]
+fn one_file_is_one_test_and_the_one_that_is_not_like_the_others_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let test = |name: &str, factor: f64| {
+        let line = |i: i32| {
+            let d = 0.6 * f64::from(i);
+            let force = frame_force(&woven_shear, SIDE, SIDE, 1e-3 * d, 1.0);
+            format!("{d},{}\n", factor * force)
+        };
+        let rows: String = (0..=100).map(line).collect();
+        let path = folder.path().join(name);
+        std::fs::write(&path, "displacement [mm],force [N]\n".to_owned() + &rows).unwrap();
+        path
+    };
+    let all = [
+        ("a.csv", 1.0),
+        ("b.csv", 1.02),
+        ("c.csv", 1.9),
+        ("d.csv", 0.98),
+    ];
+    let [a, b, c, d] = all.map(|(name, factor)| test(name, factor));
+    let step = |positive: &[&std::path::PathBuf], negative: &[&std::path::PathBuf]| {
+        let given = json!({"positive": positive, "negative": negative, "frame_side": SIDE});
+        run::<CharacterisePictureFrame>(given, &[], &[])
+    };
+    for (up, down) in [(vec![&a, &b, &a], vec![]), (vec![&a, &b], vec![&d, &a])] {
+        let told = step(&up, &down).err().expect("one file for two tests");
+        assert!(told.contains("a.csv has the rows of a.csv"), "{told}");
+    }
+    for (up, down, names) in [
+        (vec![&a, &b, &c], vec![], "c.csv: "),
+        (vec![&a, &b], vec![&d, &c], "d.csv, c.csv: "),
+    ] {
+        let log = step(&up, &down).unwrap().log;
+        let named = |l: &String| l.starts_with(&format!("{names}the mean force of a test is"));
+        assert!(log.iter().any(named), "{log:?}");
+    }
+}

@@ -46,6 +46,7 @@ pub use error::FormingError;
 pub use forming::Forming;
 pub use judge::absurd;
 pub use measure::{MANY, Penetration, untied};
+pub use output::at_the_start;
 pub use request::{Feedback, LocalInput, LocalSheet, Parameters, RecordedWay, Start};
 pub use stack::{Components, RigidName, inverse_bilinear};
 pub use watch::{PairDepth, Watch, Watched, depth_attributes, depth_warnings};

@@ -13,6 +13,32 @@ pub fn at_the_start(forming: &Forming) -> impl Iterator<Item = String> {
     long_process(forming)
         .into_iter()
         .chain(unlike_films(forming))
+        .chain(heavy_or_light(forming))
+}
+
+/// Densities (kg/m3) of sheets, their areal mass over their thickness, from lofty veils to metal: what lies outside has a wrong unit.
+const DENSITIES: [f64; 2] = [20.0, 2e4];
+
+/// Materials that have the density of nothing that is formed.
+fn heavy_or_light(forming: &Forming) -> Vec<String> {
+    let mut told = Vec::new();
+    for sheet in &forming.stack {
+        let mass = sheet.material.areal_mass.si();
+        let density = mass / sheet.thickness;
+        if (DENSITIES[0]..=DENSITIES[1]).contains(&density) {
+            continue;
+        }
+        let text = format!(
+            "the material '{}' has {mass} kg/m2 at a thickness of {} mm, which is {density:.3e} kg/m3; fabrics have 200 to 3000: look at the units of \
+             `areal_mass` and `thickness`",
+            sheet.material.name,
+            1e3 * sheet.thickness
+        );
+        if !told.contains(&text) {
+            told.push(text);
+        }
+    }
+    told
 }
 
 /// What is poor about the meshes of outlined plies.

@@ -5,7 +5,7 @@ use crate::common::scenes::{bag, gentle_press, press};
 use plyflow_forming_explicit::{
     Feedback, FormingError, LocalSheet, Parameters, Watch, Watched,
     absurd::{check, off_the_tool},
-    build_global, feed_back,
+    at_the_start, build_global, feed_back,
 };
 use serde_json::{Value, json};
 
@@ -36,6 +36,29 @@ fn the_scenes_of_the_other_tests_make_sense() {
     ] {
         judged(&p).unwrap();
     }
+}
+
+#[test]
+fn a_material_with_the_density_of_nothing_is_told_of_once() {
+    let told = |mass: &str| {
+        let p = press(2, &json!({"gap": "0.003 m"}), |p| {
+            for sheet in p["scene"]["sheets"].as_array_mut().unwrap() {
+                sheet["material"]["areal_mass"] = json!(mass);
+            }
+        });
+        let forming = build_global(&p, &BuiltIn).unwrap();
+        let all =
+            at_the_start(&forming).filter(|t| t.contains("look at the units of `areal_mass`"));
+        all.collect::<Vec<_>>()
+    };
+    for (mass, says) in [
+        ("440 kg/m2", "440 kg/m2 at a thickness of"),
+        ("0.00044 kg/m2", "0.00044 kg/m2"),
+    ] {
+        let all = told(mass);
+        assert!(all.len() == 1 && all[0].contains(says), "{all:?}");
+    }
+    assert_eq!(told("0.44 kg/m2"), Vec::<String>::new());
 }
 
 #[test]
