@@ -44,7 +44,7 @@ def nodes(deck):
     found, reading = {}, False
     for line in deck.read_text().splitlines():
         if line.startswith("*"):
-            reading = line.startswith("*Node,")
+            reading = line.strip() == "*Node"
         elif reading:
             number, *point = line.split(",")
             found[int(number)] = np.array([float(x) for x in point])

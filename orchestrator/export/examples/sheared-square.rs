@@ -49,10 +49,18 @@ fn cells() -> Vec<u32> {
     (0..SIDE * SIDE).flat_map(corners).collect()
 }
 
+/// Names and materials of the plies; with the word `names` such as come too near to each other where small letters and umlauts do not count.
+fn names(words: &[String]) -> [[&'static str; 2]; 2] {
+    match words.iter().any(|w| w == "names") {
+        true => [["a", "Gewebe \u{e4}"], ["A-Draped", "Gewebe \u{f6}"]],
+        false => [["lower", "NCF, 440 g/m2"], ["upper-2", "NCF, 440 g/m2"]],
+    }
+}
+
 fn sheets(without: &[String]) -> Value {
     let has = |what: &str| !without.iter().any(|w| w == what);
-    let ply = |name: &str, fibre_1: f64, z: f64| {
-        let mut sheet = json!({"name": name, "kind": "ply", "material": "NCF, 440 g/m2", "thickness": 0.0, "offset": z});
+    let ply = |[name, material]: [&str; 2], fibre_1: f64, z: f64| {
+        let mut sheet = json!({"name": name, "kind": "ply", "material": material, "thickness": 0.0, "offset": z});
         if has("thickness") {
             sheet["thickness"] = json!(0.0005);
         }
@@ -71,10 +79,11 @@ fn sheets(without: &[String]) -> Value {
         }
         sheet
     };
+    let [lower, upper] = names(without);
     json!([
-        ply("lower", 0.0, 0.0),
+        ply(lower, 0.0, 0.0),
         {"name": "film", "kind": "diaphragm", "thickness": 0.0001, "offset": 0.001},
-        ply("upper-2", 45.0, 0.002)
+        ply(upper, 45.0, 0.002)
     ])
 }
 
@@ -84,7 +93,8 @@ fn sheets(without: &[String]) -> Value {
 /// When the file cannot be written.
 pub fn write(path: &str, without: &[String]) -> Result<(), ArtifactError> {
     let mut w = ArtifactWriter::create(path.as_ref(), "forming")?;
-    let bodies = [("lower", 0.0), ("film", 0.001), ("upper-2", 0.002)];
+    let [[lower, _], [upper, _]] = names(without);
+    let bodies = [(lower, 0.0), ("film", 0.001), (upper, 0.002)];
     for (name, z) in bodies {
         w.define_mesh(name, &points(z, false), 4, &cells(), "")?;
     }
@@ -112,7 +122,7 @@ pub fn write(path: &str, without: &[String]) -> Result<(), ArtifactError> {
                 FieldInfo::new(On::Cells, "shear_angle", 1, "rad"),
                 &shear,
             )?;
-            if without.iter().any(|w| w == "drape") && name == "lower" {
+            if without.iter().any(|w| w == "drape") && name == lower {
                 let mut reached = vec![1.0; SIDE * SIDE];
                 reached[0] = 0.0;
                 w.frame_field(name, FieldInfo::new(On::Cells, "draped", 1, "1"), &reached)?;
@@ -130,6 +140,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut words = std::env::args().skip(1);
     let path = words
         .next()
-        .ok_or("usage: sheared-square FILE [fibres|straight|thickness|mass|drape]..")?;
+        .ok_or("usage: sheared-square FILE [fibres|straight|thickness|mass|drape|names]..")?;
     Ok(write(&path, &words.collect::<Vec<_>>())?)
 }

@@ -1,6 +1,7 @@
 //! Tables: the points of each body, and its cells. Heads and numbers are those of the step `export-csv`: as many digits as give a number back.
 
 use crate::file::File;
+use crate::names::apart;
 use crate::part::{Body, Field, Part};
 use crate::vec3::{Vec3, add_scaled, scaled};
 use plyflow_artifact::On;
@@ -8,12 +9,10 @@ use std::fmt::Write as _;
 
 /// Writes two files for each body. Where a cell has no shape, what is computed of it is left empty.
 pub fn write(part: &Part, stem: &str, files: &mut Vec<File>) {
-    for body in &part.bodies {
+    let names = apart(part.bodies.iter().map(|b| b.name.as_str()));
+    for (body, name) in part.bodies.iter().zip(names) {
         for (what, text) in [("points", points(part, body)), ("cells", cells(part, body))] {
-            files.push(File::of_text(
-                format!("{stem}-{}-{what}.csv", body.name),
-                text,
-            ));
+            files.push(File::of_text(format!("{stem}-{name}-{what}.csv"), text));
         }
     }
 }

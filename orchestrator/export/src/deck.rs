@@ -9,28 +9,28 @@
 
 use crate::fibres::Sheared;
 use crate::file::File;
+use crate::names::Names;
 use crate::part::{Part, Ply};
 use crate::request::{Format, Request};
 use crate::shells::{ELEMENT, Shells, label, shells};
 use crate::vec3::{Vec3, add_scaled, cross, scaled};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::ops::Range;
 
 /// Writes the file.
 pub fn write(part: &Part, request: &Request, files: &mut Vec<File>, told: &mut Vec<String>) {
     let calculix = request.format == Format::Calculix;
     let all = shells(part, told);
+    let labels = labels(&all);
     let mut text = String::new();
-    head(&mut text, part, &all, calculix);
-    let mut next = all.iter().map(|s| s.nodes.len()).sum::<usize>() + 1;
-    for shells in &all {
-        mesh(&mut text, shells, calculix.then_some(&mut next));
-    }
-    if !calculix && all.iter().any(|s| laminate(s).is_some()) {
+    head(&mut text, part, &labels, calculix);
+    meshes(&mut text, &all, calculix);
+    if !calculix && !labels.is_empty() {
         text += "*Distribution Table, name=PLYFLOW_AXES\nCOORD3D, COORD3D\n*Distribution Table, name=PLYFLOW_LENGTH\nLENGTH\n";
     }
     for shells in &all {
-        let Some(laminate) = laminate(shells) else {
+        let Some(laminate) = laminate(shells, &labels) else {
             told.push(format!(
                 "{}: only its mesh is written, without a section: {}",
                 shells.body.name,
@@ -46,12 +46,16 @@ pub fn write(part: &Part, request: &Request, files: &mut Vec<File>, told: &mut V
             false => distributions(&mut text, shells, &laminate, part.scale),
         }
     }
-    let materials = materials(&all);
-    if !materials.is_empty() {
+    if !labels.is_empty() {
+        let named = |(material, label): &(&str, String)| match *material == label {
+            true => label.clone(),
+            false => format!("{label} (`{material}`)"),
+        };
+        let list: Vec<String> = labels.iter().map(named).collect();
         told.push(format!(
             "give the material{} {} in your model, 1 along the fibres: what the fabric becomes with its resin is not in the artifact",
-            if materials.len() == 1 { "" } else { "s" },
-            materials.join(", ")
+            if list.len() == 1 { "" } else { "s" },
+            list.join(", ")
         ));
     }
     files.push(File::of_text(format!("{}.inp", request.stem), text));
@@ -72,28 +76,37 @@ impl Laminate<'_> {
     }
 }
 
-fn laminate<'a>(shells: &'a Shells<'_>) -> Option<Laminate<'a>> {
+/// Name of a ply's material, of plies whose fibres and thickness are known.
+fn material<'a>(shells: &'a Shells<'_>) -> Option<&'a str> {
     let ply = shells.body.ply.as_ref()?;
-    ply.laid.as_ref()?;
+    let known = ply.laid.is_some() && ply.thickness.is_some();
+    known.then(|| ply.sheet.material.as_deref().unwrap_or("fabric"))
+}
+
+fn laminate<'a>(shells: &'a Shells<'_>, labels: &[(&str, String)]) -> Option<Laminate<'a>> {
+    let name = material(shells)?;
+    let label = labels.iter().find(|(material, _)| *material == name);
+    let ply = shells.body.ply.as_ref()?;
     Some(Laminate {
         ply,
         thickness: ply.thickness.as_ref()?,
-        material: label(ply.sheet.material.as_deref().unwrap_or("fabric")),
+        material: label?.1.clone(),
     })
 }
 
-/// Names of the materials that sections ask for, each once, in the order of the plies.
-fn materials(all: &[Shells<'_>]) -> Vec<String> {
-    let mut names: Vec<String> = Vec::new();
-    for laminate in all.iter().filter_map(laminate) {
-        if !names.contains(&laminate.material) {
-            names.push(laminate.material);
+/// The materials that sections ask for, each once, in the order of the plies, with labels of which no two are alike.
+fn labels<'a>(all: &'a [Shells<'_>]) -> Vec<(&'a str, String)> {
+    let mut taken = Names::default();
+    let mut labels: Vec<(&str, String)> = Vec::new();
+    for name in all.iter().filter_map(material) {
+        if labels.iter().all(|(known, _)| *known != name) {
+            labels.push((name, taken.own(&label(name))));
         }
     }
-    names
+    labels
 }
 
-fn head(text: &mut String, part: &Part, all: &[Shells<'_>], calculix: bool) {
+fn head(text: &mut String, part: &Part, labels: &[(&str, String)], calculix: bool) {
     for line in &part.origin {
         let _ = writeln!(text, "** {line}");
     }
@@ -102,7 +115,7 @@ fn head(text: &mut String, part: &Part, all: &[Shells<'_>], calculix: bool) {
         text,
         "** For {program}: define the materials, then *Include this file. Layers from below: family 1, family 2."
     );
-    for material in materials(all) {
+    for (name, material) in labels {
         let kind = if calculix {
             "Engineering Constants"
         } else {
@@ -110,7 +123,8 @@ fn head(text: &mut String, part: &Part, all: &[Shells<'_>], calculix: bool) {
         };
         let _ = writeln!(
             text,
-            "** *Material, name={material}\n** *Elastic, type={kind}"
+            "** *Material, name={material}\n** (`{}`)\n** *Elastic, type={kind}",
+            name.replace(|c: char| c.is_control(), " ")
         );
     }
 }
@@ -125,25 +139,64 @@ fn vector(v: Vec3) -> String {
     v.map(number).join(", ")
 }
 
-/// Nodes and elements; with nodes at the middles of edges from the number in `middles` on.
-fn mesh(text: &mut String, shells: &Shells<'_>, middles: Option<&mut usize>) {
-    let name = &shells.label;
-    let _ = writeln!(text, "*Node, nset={name}");
-    for (node, at) in shells.numbered() {
-        let _ = writeln!(text, "{node}, {}", vector(at));
+/// All nodes in one block, as readers of meshes expect it, then the elements of each body, with sets of both by its name.
+fn meshes(text: &mut String, all: &[Shells<'_>], quadratic: bool) {
+    let first_middle = 1 + all.iter().map(|s| s.nodes.len()).sum::<usize>();
+    let (mut next, mut middles, mut rest) = (first_middle, String::new(), String::new());
+    text.push_str("*Node\n");
+    for shells in all {
+        for (node, at) in shells.numbered() {
+            let _ = writeln!(text, "{node}, {}", vector(at));
+        }
+        let from = next;
+        elements(
+            &mut rest,
+            &mut middles,
+            shells,
+            quadratic.then_some(&mut next),
+        );
+        node_set(&mut rest, shells, from..next);
     }
+    *text += &middles;
+    *text += &rest;
+}
+
+/// The set of a body's nodes, those at the middles of edges included.
+fn node_set(text: &mut String, shells: &Shells<'_>, middles: Range<usize>) {
+    let mut corners = shells.numbered().map(|(node, _)| node);
+    let Some(first) = corners.next() else {
+        return;
+    };
+    let last = corners.last().unwrap_or(first);
+    let _ = writeln!(
+        text,
+        "*Nset, nset={}, generate\n{first}, {last}, 1",
+        shells.label
+    );
+    if !middles.is_empty() {
+        let _ = writeln!(text, "{}, {}, 1", middles.start, middles.end - 1);
+    }
+}
+
+/// Elements; with nodes at the middles of edges from the number in `next` on, which are written to `middles`.
+fn elements(
+    text: &mut String,
+    middles: &mut String,
+    shells: &Shells<'_>,
+    next: Option<&mut usize>,
+) {
     let mut edges: BTreeMap<[usize; 2], usize> = BTreeMap::new();
     let mut elements = String::new();
-    let quadratic = middles.is_some();
+    let quadratic = next.is_some();
     let points: BTreeMap<usize, Vec3> = shells.numbered().collect();
-    if let Some(next) = middles {
+    if let Some(next) = next {
         for (element, cell) in shells.elements() {
             let mut nodes = shells.corners(cell);
             for [a, b] in sides(&nodes) {
                 let edge = [a.min(b), a.max(b)];
                 nodes.push(*edges.entry(edge).or_insert_with(|| {
                     let at = scaled(0.5, add_scaled(points[&edge[0]], 1.0, points[&edge[1]]));
-                    let _ = writeln!(text, "{next}, {}", vector(at));
+                    let _ = writeln!(middles, "{next}, {}", vector(at));
                     *next += 1;
                     *next - 1
                 }));
@@ -161,6 +214,7 @@ fn mesh(text: &mut String, shells: &Shells<'_>, middles: Option<&mut usize>) {
         (_, false) => "S4",
         (_, true) => "S8R",
     };
+    let name = &shells.label;
     let _ = write!(text, "*Element, type={kind}, elset={name}\n{elements}");
 }
 

@@ -8,11 +8,15 @@ use crate::boundary::loops;
 use crate::curves::laid_fibres;
 use crate::error::ExportError;
 use crate::file::File;
+use crate::names::Names;
 use crate::net::{Net, TooMany, rounded_up};
 use crate::part::{Body, Part, Ply};
 use crate::request::Request;
 use crate::vec3::Vec3;
 use drawing::Drawing;
+
+/// Endings of the layers of a ply behind its name.
+const LAYERS: [&str; 4] = ["", "-draped", "-fibres_1", "-fibres_2"];
 
 /// Writes both drawings.
 pub fn write(
@@ -23,18 +27,30 @@ pub fn write(
 ) -> Result<(), ExportError> {
     let mut flat = Drawing::new(request.unit, &part.origin);
     let mut draped = Drawing::new(request.unit, &part.origin);
+    // The first layer of every drawing.
+    let mut taken = Names::default();
+    taken.own("0");
     for body in &part.bodies {
         let ply = body.ply.as_ref().expect("plies alone are drawn");
         body.tell_missing(told);
-        let (name, colour) = (&body.name, (ply.number % 6 + 1) as u8);
+        let (name, colour) = (
+            taken.own_with(&body.name, &LAYERS),
+            (ply.number % 6 + 1) as u8,
+        );
+        if name != body.name {
+            told.push(format!(
+                "{}: its layers are called `{name}`, `{name}{}` and so on, as another layer has the name",
+                body.name, LAYERS[1]
+            ));
+        }
         let boundary = loops(body.usable().into_iter().map(|c| body.corners(c)));
         let pattern = pattern(body, ply, part.scale);
-        let edge = flat.layer(name, colour);
+        let edge = flat.layer(&name, colour);
         for line in &pattern {
             flat.closed_plane(edge, line);
         }
-        let reached = flat.layer(&format!("{name}-draped"), colour);
-        let edge = draped.layer(name, colour);
+        let reached = flat.layer(&format!("{name}{}", LAYERS[1]), colour);
+        let edge = draped.layer(&name, colour);
         for line in boundary {
             let at = |points: &[Vec3]| -> Vec<Vec3> {
                 line.iter().map(|i| points[*i as usize]).collect()
@@ -42,7 +58,12 @@ pub fn write(
             flat.closed_plane(reached, &at(&body.flat));
             draped.line(edge, &at(&body.points), true);
         }
-        draw_fibres((body, ply), part.scale, request, [&mut flat, &mut draped])?;
+        draw_fibres(
+            (body, ply, &name),
+            part.scale,
+            request,
+            [&mut flat, &mut draped],
+        )?;
     }
     for (what, drawing) in [("flat", flat), ("draped", draped)] {
         files.push(File::of_text(
@@ -55,7 +76,7 @@ pub fn write(
 
 /// Draws the fibre lines of a ply, flat and draped. That they are not known has been said with the fields already.
 fn draw_fibres(
-    (body, ply): (&Body, &Ply),
+    (body, ply, name): (&Body, &Ply, &str),
     scale: f64,
     request: &Request,
     [flat, draped]: [&mut Drawing; 2],
@@ -79,7 +100,7 @@ fn draw_fibres(
         would: rounded_up(e.would / scale),
     };
     for family in 0..2 {
-        let layer = format!("{}-fibres_{}", body.name, family + 1);
+        let layer = format!("{name}{}", LAYERS[2 + family]);
         let (on_flat, on_draped) = (flat.layer(&layer, 8), draped.layer(&layer, 8));
         let lines = laid_fibres(&net, (laid, scale), family, scale * request.net);
         for fibre in lines.map_err(refused)? {

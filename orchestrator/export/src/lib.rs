@@ -14,6 +14,7 @@ mod dxf;
 mod error;
 mod fibres;
 mod file;
+mod names;
 mod nastran;
 mod net;
 mod part;

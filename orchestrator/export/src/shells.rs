@@ -1,5 +1,6 @@
 //! Bodies as shells of a solver: the cells that have a shape, with numbers for nodes and elements, and names that every solver takes.
 
+use crate::names::Names;
 use crate::part::{Body, Part};
 use std::collections::BTreeSet;
 
@@ -48,7 +49,7 @@ impl Shells<'_> {
 /// The bodies, each with nodes and elements of its own, numbered from 1 through all of them. What has no shape is told and left out.
 pub fn shells<'a>(part: &'a Part, told: &mut Vec<String>) -> Vec<Shells<'a>> {
     let (mut node, mut element) = (1, 1);
-    let mut labels = BTreeSet::new();
+    let mut labels = Names::default();
     let mut all = Vec::new();
     for body in &part.bodies {
         body.tell_missing(told);
@@ -61,7 +62,7 @@ pub fn shells<'a>(part: &'a Part, told: &mut Vec<String>) -> Vec<Shells<'a>> {
         let counts = (nodes.len(), cells.len());
         all.push(Shells {
             body,
-            label: own(&mut labels, label(&body.name)),
+            label: labels.own(&label(&body.name)),
             nodes,
             first_node: node,
             cells,
@@ -89,26 +90,15 @@ pub fn label(name: &str) -> String {
     }
 }
 
-/// The label, or with a number behind it where another name has the same.
-fn own(taken: &mut BTreeSet<String>, label: String) -> String {
-    let numbered = (2..).map(|k| format!("{label}_{k}"));
-    let found = std::iter::once(label.clone())
-        .chain(numbered)
-        .find(|l| !taken.contains(l));
-    let found = found.expect("one is free");
-    taken.insert(found.clone());
-    found
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn names_become_labels_that_stay_apart() {
-        let mut taken = BTreeSet::new();
+        let mut taken = Names::default();
         let labels: Vec<String> = ["ply-1", "ply.1", "PLY_1", "_a", "ä", "cell_7"]
-            .map(|n| own(&mut taken, label(n)))
+            .map(|n| taken.own(&label(n)))
             .into();
         assert_eq!(
             labels,

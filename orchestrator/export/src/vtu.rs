@@ -5,6 +5,7 @@
 //! key for it, `UNITS_LABEL`.
 
 use crate::file::File;
+use crate::names::apart;
 use crate::part::{Body, Field, Part};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -14,8 +15,9 @@ use std::fmt::Write as _;
 /// Writes the bodies of one frame, and gives the name of the file that has them all.
 pub fn write(part: &Part, stem: &str, files: &mut Vec<File>) -> String {
     let mut blocks = String::new();
-    for (k, body) in part.bodies.iter().enumerate() {
-        let name = format!("{stem}-{}.vtu", body.name);
+    let names = apart(part.bodies.iter().map(|b| b.name.as_str()));
+    for (k, (body, name)) in part.bodies.iter().zip(names).enumerate() {
+        let name = format!("{stem}-{name}.vtu");
         let _ = writeln!(
             blocks,
             "    <DataSet index=\"{k}\" name=\"{}\" file=\"{name}\"/>",

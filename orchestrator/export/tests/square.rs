@@ -334,20 +334,13 @@ fn a_cell_that_a_drape_does_not_reach_is_in_no_deck_and_empty_in_tables() {
             .take_while(|l| !l.starts_with('*'))
             .count()
     };
-    assert_eq!(
-        [
-            rows("*Node, nset=LOWER"),
-            rows("*Element, type=S4, elset=LOWER")
-        ],
-        [24, 15]
-    );
-    assert_eq!(
-        [
-            rows("*Node, nset=UPPER_2"),
-            rows("*Element, type=S4, elset=UPPER_2")
-        ],
-        [25, 16]
-    );
+    // Readers of meshes take one block of nodes, and forget all but the last of several.
+    assert_eq!(deck.matches("*Node\n").count(), 1);
+    assert_eq!(rows("*Node\n"), 24 + 25 - 1);
+    assert!(deck.contains("*Nset, nset=LOWER, generate\n1, 24, 1\n"));
+    assert!(deck.contains("*Nset, nset=UPPER_2, generate\n25, 49, 1\n"));
+    assert_eq!(rows("*Element, type=S4, elset=LOWER"), 15);
+    assert_eq!(rows("*Element, type=S4, elset=UPPER_2"), 16);
     assert_eq!(rows("*Distribution, name=LOWER_FIBRE_2_AXES"), 1 + 15);
     let drawing = export(&artifact, &request(Format::Dxf)).unwrap();
     // Without an outline in the attributes the pattern is that of the mesh: 16 nodes. The draped part has one corner less and three nodes more.
@@ -447,5 +440,44 @@ fn what_is_not_there_is_refused_with_what_is() {
             "fibre lines; expected at most 10000: give a larger distance, such as --net '"
         ),
         "{error}"
+    );
+}
+
+#[test]
+fn names_that_are_nearly_alike_stay_apart_in_every_format() {
+    let (_keep, artifact) = artifact(&["names"]);
+    let of = |format| export(&artifact, &request(format)).unwrap();
+    for format in [Format::Abaqus, Format::Calculix] {
+        let made = of(format);
+        let deck = text(&made, "square.inp");
+        for material in ["GEWEBE__", "GEWEBE___2"] {
+            assert!(
+                deck.contains(&format!(", 3, {material}, ")),
+                "{material}: {deck:.2000}"
+            );
+        }
+        let told =
+            "materials GEWEBE__ (`Gewebe \u{e4}`), GEWEBE___2 (`Gewebe \u{f6}`) in your model";
+        assert!(
+            made.told.iter().any(|t| t.contains(told)),
+            "{:?}",
+            made.told
+        );
+    }
+    let made = of(Format::Dxf);
+    let drawing = text(&made, "square-flat.dxf");
+    let layers: Vec<&str> = drawing.split("AcDbLayerTableRecord\n").skip(1).collect();
+    let mut layers: Vec<String> = (layers.iter())
+        .map(|l| l.lines().nth(1).unwrap().to_lowercase())
+        .collect();
+    assert_eq!(layers.len(), 1 + 2 * 4, "{layers:?}");
+    layers.sort_unstable();
+    layers.dedup();
+    assert_eq!(layers.len(), 1 + 2 * 4, "{layers:?}");
+    let told = "A-Draped: its layers are called `A-Draped_2`";
+    assert!(
+        made.told.iter().any(|t| t.contains(told)),
+        "{:?}",
+        made.told
     );
 }

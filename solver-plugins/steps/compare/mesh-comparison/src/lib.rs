@@ -111,16 +111,30 @@ fn read(host: &Host, input: Input) -> Result<Run, StepError> {
     })
 }
 
-/// Largest difference of some of what is told, over the finest's largest magnitude of them.
+/// Shear (rad), 0.1 deg, of which errors are told in parts where the finest run has less: of plies that are hardly sheared every difference would be large.
+const LEAST_SHEAR: f64 = 0.1 * std::f64::consts::PI / 180.0;
+/// Plies that are sheared by less (rad) everywhere, 1 deg, say little of a mesh.
+const LITTLE_SHEAR: f64 = 10.0 * LEAST_SHEAR;
+
+/// Largest difference of some of what is told, over the finest's largest magnitude of them, or [`LEAST_SHEAR`].
 fn error(run: &Run, finest: &Run, of: &[usize]) -> f64 {
     let most = |get: &dyn Fn(usize) -> f64| of.iter().map(|&k| get(k).abs()).fold(0.0, f64::max);
     let apart = most(&|k| run.shear[k] - finest.shear[k]);
-    let scale = most(&|k| finest.shear[k]);
-    if apart == 0.0 {
-        0.0
-    } else {
-        apart / scale.max(f64::MIN_POSITIVE)
-    }
+    apart / most(&|k| finest.shear[k]).max(LEAST_SHEAR)
+}
+
+/// What to say of plies that are hardly sheared.
+fn little_shear(finest: &Run) -> Option<String> {
+    let most = EXTREMES.map(|k| finest.shear[k].abs());
+    let most = most.into_iter().fold(0.0, f64::max);
+    (most < LITTLE_SHEAR).then(|| {
+        format!(
+            "the plies of '{}' are sheared by {:.2} deg at most: their shear says little of the mesh, and the advised size is a guess. Take one from zones, whose \
+             runs are compared by the distance from the tool",
+            finest.input.step,
+            most.to_degrees()
+        )
+    })
 }
 
 /// Slope of log y over log x by least squares; `None` for fewer than two places.
@@ -172,7 +186,7 @@ fn write(host: &Host, runs: &[Run], finest: &Run, target: f64) -> Result<(), Ste
     let advice = advise(&measured, target);
     host.result("finest_error", advice.finest_error, "1")?;
     host.result("advised_element_size", advice.size, "m")?;
-    if let Some(text) = advice.doubt {
+    for text in advice.doubt.into_iter().chain(little_shear(finest)) {
         host.log(Log::Warn, &text);
     }
     host.write_f64("study/element_size", &[runs.len()], "m", &sizes)?;

@@ -18,6 +18,9 @@ const COLUMNS: [(&str, &str); 7] = [
     ("advised size", "m"),
 ];
 
+/// Distance from the tool (m) of which errors are told in parts where the finest run has less: of plies that lie on the tool every difference would be large.
+const LEAST_DISTANCE: f64 = 5e-5;
+
 /// A run of a zone.
 struct Run {
     input: Input,
@@ -131,7 +134,10 @@ fn one(
     let mut measured = Vec::new();
     for run in runs {
         let found = FieldErrors::of(&[&run.plies], &[&finest.plies], |_, _| true);
-        let told = found.and_then(|e| Some((e.position, e.distance? / e.standing_off?)));
+        let told = found.and_then(|e| {
+            let scale = e.standing_off?.max(LEAST_DISTANCE);
+            Some((e.position, e.distance? / scale))
+        });
         let Some((position, error)) = told.filter(|t| t.1.is_finite()) else {
             let step = &run.input.step;
             return Err(format!(

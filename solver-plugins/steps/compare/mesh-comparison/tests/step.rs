@@ -199,3 +199,16 @@ fn cells_that_a_net_does_not_reach_are_in_no_quantile() {
     let told = out.log.iter().filter(|l| l.contains("80.0 % of its area"));
     assert_eq!(told.count(), 2, "{:?}", out.log);
 }
+
+#[test]
+fn plies_that_are_hardly_sheared_ask_for_no_finer_mesh() {
+    // What rounding leaves of a flat ply, another one in every mesh.
+    let noise = |k: f64| move |x: f64| 4e-13 * (k * x).sin();
+    let runs = [(25, 7.0), (50, 31.0), (100, 113.0)].map(|(n, k)| strip(n, noise(k)));
+    let out = compare(&runs).unwrap();
+    assert!(out.result("quartile_error.b") < 1e-8);
+    // Never coarser than the coarsest.
+    assert!((out.result("advised_element_size") - 0.004).abs() < 1e-9);
+    let told = |l: &String| l.contains("sheared by 0.00 deg at most");
+    assert!(out.log.iter().any(told), "{:?}", out.log);
+}
