@@ -163,18 +163,24 @@ fn meshes(text: &mut String, all: &[Shells<'_>], quadratic: bool) {
 
 /// The set of a body's nodes, those at the middles of edges included.
 fn node_set(text: &mut String, shells: &Shells<'_>, middles: Range<usize>) {
-    let mut corners = shells.numbered().map(|(node, _)| node);
-    let Some(first) = corners.next() else {
+    let corners: Vec<usize> = shells.numbered().map(|(node, _)| node).collect();
+    let [first, .., last] = corners[..] else {
         return;
     };
-    let last = corners.last().unwrap_or(first);
-    let _ = writeln!(
-        text,
-        "*Nset, nset={}, generate\n{first}, {last}, 1",
-        shells.label
-    );
-    if !middles.is_empty() {
-        let _ = writeln!(text, "{}, {}, 1", middles.start, middles.end - 1);
+    let _ = write!(text, "*Nset, nset={}", shells.label);
+    if middles.is_empty() {
+        let _ = writeln!(text, ", generate\n{first}, {last}, 1");
+        return;
+    }
+    text.push('\n');
+    // Readers of meshes know one range of `generate` only, and both solvers at most 16 numbers in a line.
+    let all: Vec<String> = corners
+        .into_iter()
+        .chain(middles)
+        .map(|n| n.to_string())
+        .collect();
+    for line in all.chunks(16) {
+        let _ = writeln!(text, "{},", line.join(", "));
     }
 }
 
