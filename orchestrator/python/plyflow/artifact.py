@@ -9,6 +9,7 @@ counted from 0, and -1 is the last.
 from __future__ import annotations
 
 import json
+import operator
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -269,6 +270,10 @@ class Artifact:
     def _frame(self, frame: int) -> int:
         """A frame counted from 0, whatever end it was counted from."""
         count = max(self.frames, 1)
+        try:
+            frame = operator.index(frame)
+        except TypeError:
+            raise TypeError(f"a frame is a whole number, 0 to {count - 1}, or -1 for the last; given {frame!r}") from None
         if not -count <= frame < count:
             raise NotFound(f"{self.path.name}: no frame {frame}; there are {count}: 0 to {count - 1}, or -1 for the last")
         return frame % count

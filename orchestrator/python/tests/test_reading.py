@@ -40,6 +40,9 @@ def test_frames_are_those_that_vtkhdf_lists(run: plyflow.Run) -> None:
             assert np.array_equal(body.points_at(frame), block["Points"][at : at + len(body.reference)])
             at = int(field[frame])
             assert np.array_equal(body.field("shear_angle", frame), block["CellData/shear_angle"][at : at + len(body.cells)])
+    assert np.array_equal(body.points_at(np.int64(0)), body.points_at(0))
+    with pytest.raises(TypeError, match="a frame is a whole number, 0 to .*; given 1.5"):
+        body.field("shear_angle", frame=1.5)  # type: ignore[arg-type]
     assert not np.array_equal(body.points_at(0), body.points_at(-1)), "it has moved"
     assert np.ptp(body.reference[:, 2]) < 1e-12, "the reference is flat"
 

@@ -62,6 +62,20 @@ impl Expression {
     /// # Errors
     /// As [`Expression::holds`].
     pub fn excess(&self, of: &[Value]) -> Result<Vec<f64>, ExpressionError> {
+        let found = self.excess_and_unit(of)?;
+        Ok(found.into_iter().map(|e| e.0).collect())
+    }
+
+    /// The SI unit of each of these; empty for a plain number.
+    ///
+    /// # Errors
+    /// As [`Expression::holds`].
+    pub fn excess_units(&self, of: &[Value]) -> Result<Vec<String>, ExpressionError> {
+        let found = self.excess_and_unit(of)?;
+        Ok(found.into_iter().map(|e| e.1).collect())
+    }
+
+    fn excess_and_unit(&self, of: &[Value]) -> Result<Vec<(f64, String)>, ExpressionError> {
         let mut found = Vec::new();
         evaluate::excess(&self.root, of, &mut found)?;
         Ok(found)

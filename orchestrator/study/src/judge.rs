@@ -61,6 +61,9 @@ fn badness(value: f64, (low, high): (f64, f64)) -> f64 {
     (low - value).max(value - high)
 }
 
+/// Results that differ by less than this part are the same.
+const SAME: f64 = 1e-12;
+
 /// Finds the number of a claim. `within`: the bounds of what is expected (infinite where there is none). `None` of the value also when
 /// a claim along a variable finds no two points to compare.
 #[must_use]
@@ -113,7 +116,9 @@ pub fn judge(claim: Claim, marks: &[Mark], within: (f64, f64)) -> Found {
         }
         FamilyOf::Argmax | FamilyOf::Argmin => {
             let (_, extreme) = largest(known.iter().map(|(i, v)| (*i, sign * v)));
-            let ties = known.iter().filter(|(_, v)| sign * v == extreme);
+            // What differs by rounding alone is as large.
+            let hair = SAME * extreme.abs();
+            let ties = known.iter().filter(|(_, v)| sign * v >= extreme - hair);
             let at = worst(&mut ties.map(|(i, _)| (*i, marks[*i].along)));
             (found.value, found.at) = (at.map(|a| a.1), at.map(|a| a.0).into_iter().collect());
         }
@@ -286,6 +291,13 @@ mod tests {
             judge(of(FamilyOf::Argmax), &marks(&HILL), ALL).value,
             Some(45.0)
         );
+        // Nor does rounding part two largest ones.
+        let mut two = HILL;
+        two[1].1 = Some(10.0 - 5e-15);
+        let found = judge(of(FamilyOf::Argmax), &marks(&two), (0.0, 30.0));
+        assert_eq!(found.value, Some(45.0));
+        let found = judge(of(FamilyOf::Argmax), &marks(&two), (30.0, 60.0));
+        assert_eq!(found.value, Some(20.0));
         // Of two smallest the one that is farther from what is expected.
         assert_eq!(
             judge(of(FamilyOf::Argmin), &marks(&HILL), (-1.0, 1.0)).value,

@@ -22,7 +22,7 @@ use plyflow_model::artifact::{Attributes, Geometry, Variation};
 use plyflow_model::canonical;
 use plyflow_model::given::AskedFor;
 use plyflow_model::manifest::PluginKind;
-use plyflow_model::text::is_word;
+use plyflow_model::text::{WORD, is_word};
 use plyflow_model::units::{Dimension, parse_quantity};
 use std::collections::HashSet;
 
@@ -362,8 +362,7 @@ fn drafts<'n>(
         if !is_word(&entry.key) {
             let message = format!("`{}` cannot name a step", entry.key);
             let d = problems.add(source, &entry.key_span, message);
-            d.given(entry.key.clone())
-                .expected("letters, digits, `_` and `-`, at most 64");
+            d.given(entry.key.clone()).expected(WORD);
         }
         let plugin = entry.value.get("plugin").and_then(|node| {
             let name = Mention::new(source, &node.span, node.text()?);

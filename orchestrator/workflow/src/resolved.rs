@@ -206,8 +206,8 @@ pub struct Optimisation {
     pub maximise: bool,
     /// What must hold, as written.
     pub subject_to: Vec<String>,
-    /// How many comparisons that is.
-    pub constraints: usize,
+    /// By comparison of that, in what SI unit it is told how far it is from holding; `1` of plain numbers.
+    pub constraints: Vec<String>,
     /// The method, as written.
     pub method: String,
     /// Chooses its random numbers.

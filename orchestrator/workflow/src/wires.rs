@@ -7,7 +7,7 @@ use crate::resolved::{Dimension, ResolvedInput};
 use crate::yaml::{Kind, Node, Span};
 use petgraph::graph::{DiGraph, NodeIndex};
 use plyflow_model::manifest::{InputPort, Manifest};
-use plyflow_model::text::is_word;
+use plyflow_model::text::{WORD, is_word};
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap, HashMap, HashSet};
 
@@ -289,8 +289,7 @@ impl Reader<'_, '_> {
             if !is_word(&entry.key) {
                 let message = format!("`{}` cannot name the items of a fan-out", entry.key);
                 let d = self.problems.add(self.source, &entry.key_span, message);
-                d.given(entry.key.clone())
-                    .expected("letters, digits, `_` and `-`");
+                d.given(entry.key.clone()).expected(WORD);
             }
             let span = &entry.value.span;
             let Some(over) = self.step(&entry.value) else {

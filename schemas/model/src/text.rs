@@ -6,6 +6,9 @@
 
 use std::borrow::Cow;
 
+/// What [`is_word`] asks for, for messages.
+pub const WORD: &str = "letters, digits, `_` and `-`, none of them `-` at the front, at most 64";
+
 /// Whether a text can be a name in artifacts, labels and file names: letters, digits, `_` and `-`, at most 64.
 pub fn is_word(name: &str) -> bool {
     !name.is_empty()

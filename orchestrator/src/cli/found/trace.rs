@@ -18,8 +18,8 @@ pub struct Trace {
     /// Of the points that have been told, in their order.
     told: Vec<Told>,
     entries: Vec<Entry>,
-    /// How many constraints there are.
-    constraints: usize,
+    /// The SI units of the constraints.
+    constraints: Vec<String>,
     /// Whether its budget is used up, or its method has nothing more to ask.
     pub ended: bool,
     settled: bool,
@@ -54,7 +54,7 @@ impl Trace {
         };
         Some(Self {
             entries: trace(search, &told).ok()?,
-            constraints: o.constraints,
+            constraints: o.constraints.clone(),
             ended: told.len() == points.len() && (spent || kept.settled),
             settled: kept.settled,
             maximise: o.maximise,
@@ -75,7 +75,7 @@ impl Trace {
     /// Heads of its columns.
     pub fn heads(&self, study: &Study) -> Vec<String> {
         let mut all = vec!["asked".to_owned()];
-        all.extend((1..=self.constraints).map(|k| format!("excess_{k}")));
+        all.extend((1..=self.constraints.len()).map(|k| format!("excess_{k}")));
         all.push("feasible".into());
         let unit = &study.responses[self.objective].unit;
         all.push(head("best_so_far", unit));
@@ -90,7 +90,7 @@ impl Trace {
             Outcome::Failed => None,
         });
         let one = |k: usize| excess.and_then(|e| e.get(k)).map(|e| number(*e));
-        all.extend((0..self.constraints).map(|k| one(k).unwrap_or_default()));
+        all.extend((0..self.constraints.len()).map(|k| one(k).unwrap_or_default()));
         let entry = self.entries.get(at);
         all.push(match entry.and_then(|e| e.feasible) {
             Some(true) => "yes".into(),
@@ -116,13 +116,13 @@ impl Trace {
     pub fn columns(&self, study: &Study) -> Vec<Column> {
         let mut all = Vec::new();
         let rows = || 0..self.told.len();
-        for k in 0..self.constraints {
+        for (k, unit) in self.constraints.iter().enumerate() {
             let value = |i: usize| match &self.told[i].outcome {
                 Outcome::Done { excess, .. } => Some((i as u32, *excess.get(k)?)),
                 Outcome::Failed => None,
             };
             let known = rows().filter_map(value).collect();
-            all.push((format!("excess_{}", k + 1), "1".to_owned(), known));
+            all.push((format!("excess_{}", k + 1), unit.clone(), known));
         }
         let feasible = |i: usize| {
             let feasible = self.entries[i].feasible?;

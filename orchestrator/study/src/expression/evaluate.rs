@@ -152,13 +152,13 @@ fn call(function: Function, given: &[Quantity]) -> Result<Quantity, Problem> {
 pub(super) fn excess(
     node: &Node,
     of: &[Value],
-    found: &mut Vec<f64>,
+    found: &mut Vec<(f64, String)>,
 ) -> Result<(), ExpressionError> {
     let Kind::Compared(all, last) = &node.kind else {
         if let Kind::And(all) = &node.kind {
             return all.iter().try_for_each(|n| excess(n, of, found));
         }
-        found.push(f64::from(u8::from(!yes(node, of)?)));
+        found.push((f64::from(u8::from(!yes(node, of)?)), String::new()));
         return Ok(());
     };
     let nodes: Vec<&Node> = all.iter().map(|(_, n)| n).chain([&**last]).collect();
@@ -173,7 +173,11 @@ pub(super) fn excess(
             }
             _ => 1.0,
         };
-        found.push(size);
+        let unit = match *sign {
+            Compare::Other => String::new(),
+            _ => a.kind().si_unit(),
+        };
+        found.push((size, unit));
     }
     Ok(())
 }

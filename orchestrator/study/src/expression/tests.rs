@@ -121,6 +121,16 @@ fn what_does_not_hold_tells_how_far_it_is_from_it() {
     };
     let of = [Value::of_text("3 mm").unwrap(), Value::Text("L3".into())];
     let excess = |t: &str| Expression::read(t, names).unwrap().excess(&of).unwrap();
+    let units = |t: &str| {
+        Expression::read(t, names)
+            .unwrap()
+            .excess_units(&of)
+            .unwrap()
+    };
+    assert_eq!(
+        units("x <= 5 mm and layup == 'L4' and x / 1 mm < 7"),
+        ["m", "", ""]
+    );
     assert_eq!(excess("x <= 5 mm"), [0.0]);
     assert_eq!(excess("x <= 1 mm and x > 1 mm"), [0.002, 0.0]);
     assert_eq!(excess("1 mm <= x <= 2 mm"), [0.0, 0.001]);

@@ -252,7 +252,7 @@ fn objective(
     Some((objective, maximise))
 }
 
-/// The conditions of `subject_to`, and of how many parts they consist; everything wrong is reported.
+/// The conditions of `subject_to`, and the SI units of their parts; everything wrong is reported.
 fn conditions(
     node: &Node,
     family: &Family,
@@ -260,8 +260,8 @@ fn conditions(
     responses: &[StudyResponse],
     source: &Source,
     problems: &mut Problems,
-) -> Option<(Vec<String>, usize)> {
-    let (mut subject_to, mut constraints) = (Vec::new(), 0);
+) -> Option<(Vec<String>, Vec<String>)> {
+    let (mut subject_to, mut constraints) = (Vec::new(), Vec::new());
     for item in node.get("subject_to").map_or(&[][..], Node::items) {
         let text = item.text()?;
         // With numbers that are equal nowhere, so that units are all that can be wrong.
@@ -274,8 +274,8 @@ fn conditions(
             bare: true,
         };
         let found = Expression::read(text, names).and_then(|e| match values {
-            Some(values) => e.excess(&values).map(|parts| (e.variables(), parts.len())),
-            None => Ok((e.variables(), 1)),
+            Some(values) => e.excess_units(&values).map(|units| (e.variables(), units)),
+            None => Ok((e.variables(), vec![String::new()])),
         });
         match found {
             Ok((named, _)) if named.iter().all(|i| *i < family.names.len()) => {
@@ -283,9 +283,10 @@ fn conditions(
                 d.expected("a condition on a response")
                     .help("what variables may be is said by `over`");
             }
-            Ok((_, parts)) => {
+            Ok((_, units)) => {
                 subject_to.push(text.to_owned());
-                constraints += parts;
+                let plain = |u: String| if u.is_empty() { "1".into() } else { u };
+                constraints.extend(units.into_iter().map(plain));
             }
             Err(e) => {
                 let span = within(source, item, text, &e.at);

@@ -221,8 +221,7 @@ impl Reader<'_> {
             return Some(name.to_owned());
         }
         let problem = Problem::new(format!("`{name}` cannot name a variable"));
-        let expected =
-            "letters, digits and `_`, beginning with a letter, and no word of expressions";
+        let expected = "letters, digits and `_`, at most 64 of them, beginning with a letter, and no word of expressions";
         self.tell(problem.expected(expected), span);
         None
     }

@@ -8,7 +8,7 @@ use crate::study::space::Family;
 use crate::study::told::{is_column, report, within};
 use crate::wires::Wiring;
 use crate::yaml::{Entry, Kind, Node};
-use plyflow_model::text::is_word;
+use plyflow_model::text::{WORD, is_word};
 use plyflow_model::workflow::ResponseOf;
 use plyflow_study::{Expression, ExpressionError, Kind as ValueKind, Names, Value};
 
@@ -26,8 +26,7 @@ pub(super) fn responses(
         if !is_word(&entry.key) {
             let message = format!("`{}` cannot name a response", entry.key);
             let d = problems.add(source, &entry.key_span, message);
-            d.given(entry.key.clone())
-                .expected("letters, digits, `_` and `-`, at most 64");
+            d.given(entry.key.clone()).expected(WORD);
         }
         let taken = match is_column(&entry.key) {
             true => Some("a column that every table of a study has"),

@@ -8,7 +8,7 @@ use crate::rules::known::Known;
 use crate::rules::steering;
 use crate::scene::{FibreDirection, Sheet, SheetKind};
 use crate::steering::SQUARE;
-use crate::text::is_word;
+use crate::text::{WORD, is_word};
 use crate::units::si_number;
 
 /// Names that sheets may not have: what is rigid is a body of the artifact, or a part that rubs, under its own name.
@@ -54,8 +54,7 @@ fn name(sheet: &Sheet, taken: &[&str], path: Path) -> Option<Fault> {
         );
     }
     (!is_word(name)).then(|| {
-        Fault::text(Rule::Name, path, format!("`{name}` cannot name a body"))
-            .expected("letters, digits, `_` and `-`")
+        Fault::text(Rule::Name, path, format!("`{name}` cannot name a body")).expected(WORD)
     })
 }
 

@@ -9,7 +9,7 @@ use crate::scene::{MirrorPlane, Sheet, SheetKind};
 use crate::stamping::{
     ForceCourse, Gripper, MatchingDie, PartMotion, Pressed, Side, Stamping, StampingPart, TOOL,
 };
-use crate::text::is_word;
+use crate::text::{WORD, is_word};
 use crate::tool::{DoubleDomeTool, Tool, rules};
 use crate::units::{ForcePerLength, si_number};
 
@@ -101,7 +101,7 @@ fn names(known: &Known<'_>, stamping: &Stamping, found: &mut Vec<Fault>) {
             found.push(fault.expected("a name of its own for every part, other than `bed`"));
         } else if !is_word(name) {
             let fault = Fault::text(Rule::Name, path, format!("`{name}` cannot name a body"));
-            found.push(fault.expected("letters, digits, `_` and `-`"));
+            found.push(fault.expected(WORD));
         }
     }
 }

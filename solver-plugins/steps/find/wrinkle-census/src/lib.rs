@@ -29,7 +29,7 @@ use plyflow_geometry::vec3::Vec3;
 use plyflow_model::artifact::{
     Census, CensusBody, CensusCircle, CrossSection, Map, Panel, SectionWrinkle, Wrinkle,
 };
-use plyflow_sdk::{Host, On, Step, StepError, export_step};
+use plyflow_sdk::{Host, Log, On, Step, StepError, export_step};
 use plyflow_surface::Topology;
 use plyflow_surface::{weighted_mean, weighted_quantiles};
 use spread::Spread;
@@ -97,6 +97,9 @@ fn told(value: f64) -> f64 {
     (1e3 * value).round() / 1e3 + 0.0
 }
 
+/// A circle of which less than this part lies on the ply is told.
+const MOSTLY: f64 = 0.95;
+
 /// Counts the wrinkles of every circle and writes its profile.
 fn circles(
     host: &Host,
@@ -114,6 +117,15 @@ fn circles(
             )
             .into());
         };
+        let share = hits.iter().flatten().count() as f64 / hits.len() as f64;
+        if share < MOSTLY {
+            let text = format!(
+                "circles: of the circle with a radius of {:.1} mm only {:.0} % lies on the ply: no wrinkle is counted on the rest",
+                1e3 * radius,
+                100.0 * share
+            );
+            host.log(Log::Warn, &text);
+        }
         counted.push(waves(&hits, *radius, &p.criteria()));
         let on = hits
             .iter()

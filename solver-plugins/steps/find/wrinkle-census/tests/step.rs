@@ -470,6 +470,11 @@ fn a_level_ply_has_none_and_a_circle_beside_it_is_told() {
     assert_eq!(found.result("wrinkles"), 0.0);
     // Rounding of the interpolation.
     assert!(found.result("inner_deviation") < 1e-15);
+    assert!(found.log.is_empty(), "{:?}", found.log);
+    // The corners of the square reach beyond 150 mm, its sides do not.
+    let partly = census(&level, parameters(json!([0.17]))).unwrap().log;
+    let told = "of the circle with a radius of 170.0 mm only ";
+    assert!(partly.iter().any(|l| l.contains(told)), "{partly:?}");
     let told = census(&level, parameters(json!([0.5]))).unwrap_err();
     assert!(told.contains("500.0 mm lies all beside the ply"), "{told}");
     let mut other = parameters(json!([0.09]));
