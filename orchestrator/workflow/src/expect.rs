@@ -151,6 +151,16 @@ fn entry(
             let d = problems.add(source, &at.span, message);
             d.expected("steps whose results have the same unit");
         }
+        for (k, step) in names.iter().enumerate() {
+            if names[..k].iter().any(|n| n.text() == step.text()) {
+                let message = format!(
+                    "`{}` counts twice in the mean",
+                    step.text().unwrap_or_default()
+                );
+                let d = problems.add(source, &step.span, message);
+                d.expected("each step once");
+            }
+        }
         all[0].mean_over = all.iter().map(|e| e.step.clone()).collect();
         all.truncate(1);
     }
@@ -183,7 +193,8 @@ fn expectation(
     };
     let (value, tolerance) = (number("value"), number("tolerance"));
     let (minimum, maximum) = (number("minimum"), number("maximum"));
-    consistent(item, result, tolerance, minimum, maximum, source, problems);
+    let numbers = [value, tolerance, minimum, maximum];
+    consistent(item, result, numbers, source, problems);
     Some(Expectation {
         step: name.to_owned(),
         mean_over: Vec::new(),
@@ -201,9 +212,7 @@ fn expectation(
 fn consistent(
     item: &Node,
     result: &Node,
-    tolerance: Option<f64>,
-    minimum: Option<f64>,
-    maximum: Option<f64>,
+    [value, tolerance, minimum, maximum]: [Option<f64>; 4],
     source: &Source,
     problems: &mut Problems,
 ) {
@@ -221,6 +230,35 @@ fn consistent(
             problems
                 .add(source, &t.span, "`tolerance` is negative")
                 .given(t.describe());
+        }
+    }
+    bounds_meet(item, [value, tolerance, minimum, maximum], source, problems);
+}
+
+/// Reports bounds between which there is nothing, and a value that is outside of them with its tolerance: no result could be as expected. In the unit that they are
+/// compared in: value, tolerance, minimum, maximum.
+pub(crate) fn bounds_meet(
+    item: &Node,
+    [value, tolerance, minimum, maximum]: [Option<f64>; 4],
+    source: &Source,
+    problems: &mut Problems,
+) {
+    let outside = |bound: &str, by: Option<f64>| {
+        let given = item.get("value").zip(item.get(bound));
+        given.filter(|_| by.is_some_and(|b| b > tolerance.unwrap_or(0.0).max(0.0)))
+    };
+    let below = minimum.zip(value).map(|(low, v)| low - v);
+    let above = maximum.zip(value).map(|(high, v)| v - high);
+    for (bound, by) in [("minimum", below), ("maximum", above)] {
+        if let Some((given, other)) = outside(bound, by) {
+            let message = format!(
+                "`value` lies beyond `{bound}` by more than its tolerance: nothing can be as expected"
+            );
+            let d = problems.add(source, &given.span, message);
+            d.given(given.describe()).expected(match bound {
+                "minimum" => format!("at least {}", other.describe()),
+                _ => format!("at most {}", other.describe()),
+            });
         }
     }
     if let (Some(low), Some(high)) = (minimum, maximum)

@@ -140,6 +140,18 @@ fn expectations_that_no_point_can_answer_are_refused() {
         ),
         ("response: length, of: max", "states nothing"),
         (
+            "response: length, of: max, minimum: 5 mm, maximum: 1 mm",
+            "`minimum` is greater than `maximum`",
+        ),
+        (
+            "response: length, of: max, value: 5 mm, tolerance: 1 mm, maximum: 3.9 mm",
+            "`value` lies beyond `maximum` by more than its tolerance",
+        ),
+        (
+            "response: length, of: max, value: 2 mm, tolerance: 1 mm, minimum: 3.1 mm",
+            "`value` lies beyond `minimum` by more than its tolerance",
+        ),
+        (
             "response: length, of: monotone, over: limit, direction: increasing, maximum: 1 mm",
             "`maximum` with `of: monotone`",
         ),

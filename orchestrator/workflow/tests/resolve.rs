@@ -511,3 +511,15 @@ fn a_file_that_several_steps_read_is_missed_once() {
         found.render(false)
     );
 }
+
+#[test]
+fn a_step_that_counts_twice_in_a_mean_is_refused() {
+    let study = Study::sound();
+    let mean = |steps: &str| {
+        let of = format!("step: {steps}, result: kinetic_ratio, of: mean, maximum: 0.05");
+        format!("expect:\n  - {{{of}}}\n")
+    };
+    study.mutate("workflow.yaml", "expect:\n", &mean("[coarse, coarse]"));
+    let told = study.load().unwrap_err().to_string();
+    assert!(told.contains("`coarse` counts twice in the mean"), "{told}");
+}

@@ -2,6 +2,7 @@
 
 use crate::diagnostics::{Problems, Source};
 use crate::draft::Draft;
+use crate::expect::bounds_meet;
 use crate::resolved::{FamilyExpectation, StudyResponse};
 use crate::results::value;
 use crate::study::optimise::looked_for;
@@ -83,6 +84,12 @@ impl<'a> Asked<'a> {
         if let (Some(_), Some(e)) = (tolerance.filter(|t| *t < 0.0), item.entry("tolerance")) {
             problems.add(source, &e.value.span, "`tolerance` is negative");
         }
+        bounds_meet(
+            item,
+            [expected, tolerance, minimum, maximum],
+            source,
+            problems,
+        );
         let relative = item
             .get("relative_tolerance")
             .and_then(|n| n.to_json().as_f64());

@@ -395,6 +395,20 @@ pub const CASES: &[Case] = &[
         0,
         &["is an angle"],
     ),
+    (
+        W,
+        "value: 68 mm, tolerance: 7 mm",
+        "value: 68 mm, tolerance: 7 mm, maximum: 60 mm",
+        0,
+        &["`value` lies beyond `maximum` by more than its tolerance"],
+    ),
+    (
+        W,
+        "value: 68 mm, tolerance: 7 mm",
+        "minimum: 70 mm, maximum: 60 mm",
+        0,
+        &["`minimum` is greater than `maximum`"],
+    ),
     (W, ", maximum: 0.05", "", 0, &["states nothing"]),
     (
         W,
