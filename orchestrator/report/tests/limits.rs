@@ -469,3 +469,20 @@ fn what_is_flagged_outside_of_the_zones_is_not_judged_unless_it_is_too_small_for
         }
     }
 }
+
+#[test]
+fn of_several_comparisons_the_verdict_names_the_one_that_it_is_by() {
+    let (_keep, folder) = folder();
+    let mut study = Study::new(&folder);
+    study.forming("coarse", None, 0.008);
+    study.defects(false);
+    study.zones(&ZONES[..1]);
+    study.boundary("A");
+    study.forming("local[A]", Some(ZONES[0]), 0.004);
+    study.compared("demo", ["coarse", "local"], &ZONES[..1], &[]);
+    study.compared("later", ["coarse", "local"], &ZONES[..1], &[]);
+    let input = with(study.input(), json!({"bridging_gap": "1 m"}));
+    let gap = of(&input, LimitOn::BridgingGap, None);
+    let named = "judged by the fine runs of demo: those of later in the same zones are not asked";
+    assert!(gap.notes.iter().any(|n| n == named), "{gap:?}");
+}

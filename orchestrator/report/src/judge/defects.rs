@@ -131,6 +131,13 @@ impl<'a> Look<'a> {
             ));
         }
         self.elsewhere(on, limits, &mut all);
+        if !c.others.is_empty() {
+            all.notes.push(format!(
+                "judged by the fine runs of {}: those of {} in the same zones are not asked",
+                c.label,
+                c.others.join(", ")
+            ));
+        }
         all
     }
 

@@ -462,7 +462,7 @@ fn one_file_is_one_test_and_the_one_that_is_not_like_the_others_is_named() {
         run::<CharacterisePictureFrame>(given, &[], &[])
     };
     for (up, down) in [(vec![&a, &b, &a], vec![]), (vec![&a, &b], vec![&d, &a])] {
-        let told = step(&up, &down).err().expect("one file for two tests");
+        let told = step(&up, &down).expect_err("one file for two tests");
         assert!(told.contains("a.csv has the rows of a.csv"), "{told}");
     }
     for (up, down, names) in [
