@@ -1,10 +1,8 @@
 //! The words of a scene that stand for files: the plies of a ply book, contours that are drawn in a file, and directions of a table. What the files say takes the place of
 //! these words in the tree, as if it were written there; each value still knows where in which file it stands.
 
-mod rows;
+pub(crate) mod rows;
 mod steered;
-
-pub(crate) use rows::cross;
 
 use crate::diagnostics::{Mention, Problems, Source};
 use crate::evidence;

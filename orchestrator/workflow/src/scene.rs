@@ -195,7 +195,7 @@ pub fn scene_value(
     let found = resolver.problems.places_from(before);
     let files = stl_files(resolver, &node, at);
     let materials = materials(resolver, &node, at);
-    plies::cross(&mut node, &materials);
+    plies::rows::cross(&mut node, &materials);
     let node = &node;
     // Rules look at all sheets: without those of a book that could not be read they would find what is none.
     if filled.sound {
