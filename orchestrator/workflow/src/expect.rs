@@ -6,7 +6,7 @@ use crate::diagnostics::{Mention, Problems, Source};
 use crate::draft::Draft;
 use crate::named::{named, unreadable};
 use crate::resolved::{Expectation, FamilyExpectation};
-use crate::results::{declared, value};
+use crate::results::{bounds_meet, declared, value};
 use crate::study::Asked;
 use crate::yaml::{Kind, Node};
 use plyflow_files::open::{self, MOST_WRITTEN};
@@ -233,41 +233,4 @@ fn consistent(
         }
     }
     bounds_meet(item, [value, tolerance, minimum, maximum], source, problems);
-}
-
-/// Reports bounds between which there is nothing, and a value that is outside of them with its tolerance: no result could be as expected. In the unit that they are
-/// compared in: value, tolerance, minimum, maximum.
-pub(crate) fn bounds_meet(
-    item: &Node,
-    [value, tolerance, minimum, maximum]: [Option<f64>; 4],
-    source: &Source,
-    problems: &mut Problems,
-) {
-    let outside = |bound: &str, by: Option<f64>| {
-        let given = item.get("value").zip(item.get(bound));
-        given.filter(|_| by.is_some_and(|b| b > tolerance.unwrap_or(0.0).max(0.0)))
-    };
-    let below = minimum.zip(value).map(|(low, v)| low - v);
-    let above = maximum.zip(value).map(|(high, v)| v - high);
-    for (bound, by) in [("minimum", below), ("maximum", above)] {
-        if let Some((given, other)) = outside(bound, by) {
-            let message = format!(
-                "`value` lies beyond `{bound}` by more than its tolerance: nothing can be as expected"
-            );
-            let d = problems.add(source, &given.span, message);
-            d.given(given.describe()).expected(match bound {
-                "minimum" => format!("at least {}", other.describe()),
-                _ => format!("at most {}", other.describe()),
-            });
-        }
-    }
-    if let (Some(low), Some(high)) = (minimum, maximum)
-        && low > high
-        && let (Some(least), Some(most)) = (item.get("minimum"), item.get("maximum"))
-    {
-        let message = "`minimum` is greater than `maximum`";
-        let d = problems.add(source, &least.span, message);
-        d.given(least.describe());
-        d.expected(format!("at most {}", most.describe()));
-    }
 }

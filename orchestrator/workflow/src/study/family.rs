@@ -2,9 +2,8 @@
 
 use crate::diagnostics::{Problems, Source};
 use crate::draft::Draft;
-use crate::expect::bounds_meet;
 use crate::resolved::{FamilyExpectation, StudyResponse};
-use crate::results::value;
+use crate::results::{bounds_meet, value};
 use crate::study::optimise::looked_for;
 use crate::study::responses::responses;
 use crate::study::space::Family;
