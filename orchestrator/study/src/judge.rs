@@ -115,11 +115,8 @@ pub fn judge(claim: Claim, marks: &[Mark], within: (f64, f64)) -> Found {
             (found.value, found.at) = (Some(value), vec![at]);
         }
         FamilyOf::Argmax | FamilyOf::Argmin => {
-            let (_, extreme) = largest(known.iter().map(|(i, v)| (*i, sign * v)));
-            // What differs by rounding alone is as large.
-            let hair = SAME * extreme.abs();
-            let ties = known.iter().filter(|(_, v)| sign * v >= extreme - hair);
-            let at = worst(&mut ties.map(|(i, _)| (*i, marks[*i].along)));
+            let ties = as_large(&known, sign);
+            let at = worst(&mut ties.map(|i| (i, marks[i].along)));
             (found.value, found.at) = (at.map(|a| a.1), at.map(|a| a.0).into_iter().collect());
         }
         FamilyOf::Monotone => along(&mut found, monotone(marks, &pairs, claim.increasing)),
@@ -128,6 +125,14 @@ pub fn judge(claim: Claim, marks: &[Mark], within: (f64, f64)) -> Found {
         FamilyOf::Best => {}
     }
     found
+}
+
+/// Positions of the largest of some results times `sign`, and of those that differ from it by rounding alone.
+fn as_large(known: &[(usize, f64)], sign: f64) -> impl Iterator<Item = usize> {
+    let (_, extreme) = largest(known.iter().map(|(i, v)| (*i, sign * v)));
+    let least = extreme - SAME * extreme.abs();
+    let ties = known.iter().filter(move |(_, v)| sign * v >= least);
+    ties.map(|(i, _)| *i)
 }
 
 fn along(found: &mut Found, worst: Option<(f64, [usize; 2])>) {

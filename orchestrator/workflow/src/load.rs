@@ -10,7 +10,7 @@ use crate::expect;
 use crate::hints::other_format;
 use crate::limits;
 use crate::named::absolute;
-use crate::overrides::{self, Override};
+use crate::overrides::{self, Lost, Override, without_variables};
 use crate::parameters::{Place, Resolver, find};
 use crate::resolved::{FailurePolicy, ResolvedInput, ResolvedStep, ResolvedWorkflow, Resources};
 use crate::study::{Asked, Family, PointsOf};
@@ -165,10 +165,7 @@ fn load_into(
     }
     let lost = overrides::apply(&mut root, wanted.overrides, &mut source, problems, catalog);
     let confirming = confirm::wanted(&mut root, wanted.confirm, &source, catalog, problems)?;
-    let family = family(&root, wanted.points, &source, problems)?;
-    if let Some(family) = &family {
-        overrides::without_variables(&lost, &family.names, &source, problems);
-    }
+    let family = family(&root, wanted.points, &lost, &source, problems)?;
     let shown = family.as_ref().map(|f| f.first(&root));
     Checker::new(&WORKFLOW, &source, problems)
         .check(shown.as_ref().unwrap_or(&root), "the workflow");
@@ -220,10 +217,11 @@ fn load_into(
 fn family(
     root: &Node,
     points: &PointsOf<'_>,
+    lost: &[Lost],
     source: &Source,
     problems: &mut Problems,
 ) -> Option<Option<Family>> {
-    Some(match (root.get("study"), root.entry("optimise")) {
+    let family = match (root.get("study"), root.entry("optimise")) {
         (Some(_), Some(e)) if e.value.kind != Kind::Null => {
             let message = "`study` and `optimise` in one workflow";
             let d = problems.add(source, &e.key_span, message);
@@ -235,7 +233,10 @@ fn family(
             &e.value, root, points, source, problems,
         )?),
         (None, None) => None,
-    })
+    };
+    let names = family.as_ref().map_or(&[][..], |f| &f.names);
+    without_variables(lost, names, source, problems);
+    Some(family)
 }
 
 /// Reports responses of a workflow that has no points to take them from.

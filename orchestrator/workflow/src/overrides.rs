@@ -126,7 +126,8 @@ pub(crate) fn apply(
             name: "with".into(),
             span: step.span.start..step.span.start,
         };
-        let path: Vec<Word> = std::iter::once(with)
+        let path: Vec<Word> = [with]
+            .into_iter()
             .chain(given.path.iter().map(on))
             .collect();
         let file = step
@@ -135,23 +136,24 @@ pub(crate) fn apply(
             .and_then(|name| catalog.find(name, &source.folder).ok())
             .and_then(|entry| words_to_file(&entry.manifest.parameters, &given.path));
         if let Err(blocked) = set(step, &path, file, value) {
-            let name = &path[blocked.at - 1].name;
             let d = blocked.report(&path, source, problems);
             d.given(given.text.clone());
             if blocked.names.is_empty() {
-                d.help(format!(
-                    "give the whole of `{name}`, as in --set '{}.{name}={{..}}', or write it out in the file",
-                    wanted.name
-                ));
+                d.help(whole_of(&path[blocked.at - 1].name, &wanted.name));
             }
         }
-        let after = words(root);
-        lost.push(Lost {
-            span: wanted.span.start..path[path.len() - 1].span.end,
-            words: before.difference(&after).cloned().collect(),
-        });
+        let span = wanted.span.start..path[path.len() - 1].span.end;
+        let words = before.difference(&words(root)).cloned().collect();
+        lost.push(Lost { span, words });
     }
     lost
+}
+
+/// What to do where a path leads into something that has no parts.
+fn whole_of(name: &str, step: &str) -> String {
+    format!(
+        "give the whole of `{name}`, as in --set '{step}.{name}={{..}}', or write it out in the file"
+    )
 }
 
 /// Words that an override has taken out of the steps.

@@ -134,10 +134,8 @@ fn one(
     let mut measured = Vec::new();
     for run in runs {
         let found = FieldErrors::of(&[&run.plies], &[&finest.plies], |_, _| true);
-        let told = found.and_then(|e| {
-            let scale = e.standing_off?.max(LEAST_DISTANCE);
-            Some((e.position, e.distance? / scale))
-        });
+        let scale = |e: &FieldErrors| Some(e.standing_off?.max(LEAST_DISTANCE));
+        let told = found.and_then(|e| Some((e.position, e.distance? / scale(&e)?)));
         let Some((position, error)) = told.filter(|t| t.1.is_finite()) else {
             let step = &run.input.step;
             return Err(format!(
