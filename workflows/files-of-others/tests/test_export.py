@@ -297,7 +297,7 @@ def test_a_second_export_has_the_same_bytes_and_says_so(study, exported):
     again = call(study, "export", "workflow.yaml", "draped", "--trust", "--format", FORMATS, "--unit", "mm", "--net", "15 mm", "--to", str(folder))
     assert all(line.endswith(", as it was") for line in again.splitlines() if not line.startswith("note: "))
     assert {p.name: p.read_bytes() for p in folder.iterdir()} == before
-    assert "give the material WOVEN_38616 in your model" in said["draped"]
+    assert "give the material WOVEN_38616 (`Woven 38616`) in your model" in said["draped"]
     # Another unit is another content, and nothing is replaced unasked.
     refused = call(study, "export", "workflow.yaml", "draped", "--trust", "--format", "csv", "--to", str(folder), code=2)
     assert "in the way, with another content" in refused
