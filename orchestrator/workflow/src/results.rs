@@ -151,7 +151,7 @@ pub(crate) fn bounds_meet(
 ) {
     let outside = |bound: &str, by: Option<f64>| {
         let given = item.get("value").zip(item.get(bound));
-        given.filter(|_| by.is_some_and(|b| b > tolerance.unwrap_or(0.0).max(0.0)))
+        given.filter(|_| by.is_some_and(|b| b > tolerance.unwrap_or(0.0).max(0.0) * (1.0 + 1e-9)))
     };
     let below = minimum.zip(value).map(|(low, v)| low - v);
     let above = maximum.zip(value).map(|(high, v)| v - high);

@@ -68,9 +68,9 @@ impl<'a> Look<'a> {
         }
         let all = measured.iter().map(|at| self.measured(*at, on, limits));
         let mut all: Vec<Evidence> = all.collect();
-        // Where several have measured, those count that leave nothing open, in whatever order they stand in the file.
+        // Where one of several leaves nothing open, nothing is, in whatever order they stand in the file. What any of them has found counts.
         if all.iter().any(|e| e.open.is_empty()) {
-            all.retain(|e| e.open.is_empty());
+            all.iter_mut().for_each(|e| e.open.clear());
         }
         all.into_iter().fold(Evidence::default(), Evidence::and)
     }

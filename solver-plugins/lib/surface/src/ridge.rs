@@ -116,9 +116,11 @@ pub fn sharpness(topology: &Topology, points: &[Vec3], nodes: &[u32]) -> f64 {
     nodes.iter().map(turn).fold(0.0, f64::max)
 }
 
-/// Nodes over which the direction of a crest is taken where it goes on to the rim, and how far from it (in cells) a node of the rim may lie to be its end.
+/// Nodes over which the direction of a crest is taken where it goes on to the rim.
 const HEADING: usize = 4;
+/// How far from a crest that is drawn on (in cells) a node of the rim may lie to be its end.
 const NEAR: f64 = 0.75;
+/// A crest whose direction has this cosine or more with the rim's, within 16 degrees of it, runs along the rim and ends nowhere on it.
 const CROSSED: f64 = 0.96;
 
 /// Rounds of [`without_steps`], and how far a round goes to the middle of the neighbours and then back.
